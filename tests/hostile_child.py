@@ -103,9 +103,6 @@ def forked(kind: str, path: Path) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    import yourdfpy  # noqa: F401  # takes most of a second, which is not the files' fault
-
-    wanted = [(kind, Path(path)) for kind, path in json.loads(sys.argv[1])]
-    if any(kind in ("base", "estimator", "points", "intrinsics") for kind, _ in wanted):
-        pass  # as above
-    print(json.dumps([forked(kind, path) for kind, path in wanted]))
+    # What libraries take to be imported is not the files' fault: a sound file brings them in, once for all processes.
+    load(Path(__file__).parents[1] / "urdf_assets" / "laptop")
+    print(json.dumps([forked(kind, Path(path)) for kind, path in json.loads(sys.argv[1])]))
