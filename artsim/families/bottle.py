@@ -15,12 +15,13 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.families.vessels import GAP, Level, cap, cross_section, dome, grip_loop, moulded, neck, pump_head, ribs
-from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute, screw
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute, screw
 from artsim.making.outlines import UP
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube
 
 DENSITY = 300.0  # kg/m^3, as the pieces are solid and real ones are hollow
-SHAPES = ("wine", "beer", "water", "shampoo", "cone", "ball", "jar", "flask", "tube", "waist")
+SHAPES = {"wine": 0.1, "beer": 0.08, "water": 0.12, "shampoo": 0.16, "cone": 0.08, "ball": 0.07, "jar": 0.12,
+          "flask": 0.1, "tube": 0.09, "waist": 0.08}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -36,9 +37,10 @@ class Mouth:
 
 def build(rng: Rng) -> Assembly:
     """A bottle, closed at rest; nozzles, triggers and the free edge of flip tops are at -X, handles at +X."""
-    closures = (_screw_cap, _pump, _flip_top, _stopper, _sprayer, _cup, _bail)
-    closure = closures[int(rng.choice(len(closures), p=[0.34, 0.15, 0.16, 0.12, 0.09, 0.07, 0.07]))]
-    shape = str(rng.choice(SHAPES, p=[0.1, 0.08, 0.12, 0.16, 0.08, 0.07, 0.12, 0.1, 0.09, 0.08]))
+    closure = pick(
+        rng, {_screw_cap: 0.34, _pump: 0.15, _flip_top: 0.16, _stopper: 0.12, _sprayer: 0.09, _cup: 0.07, _bail: 0.07}
+    )
+    shape = pick(rng, SHAPES)
     wide_mouth = shape == "jar" and closure in (_screw_cap, _flip_top, _stopper, _cup, _bail)
     body, mouth = _body(rng, shape, wide_mouth, 0.022 if closure in (_pump, _sprayer, _bail) else 0.012)
     bottle = Assembly(density=DENSITY)
@@ -49,7 +51,7 @@ def build(rng: Rng) -> Assembly:
 def _body(rng: Rng, shape: str, wide: bool, tall: float) -> tuple[Solid, Mouth]:
     """Body without its closure; its neck is at least ``tall`` above the shoulder."""
     kinds = {"wine": ["round"], "beer": ["round"], "flask": ["flask", "square"], "ball": ["round", "octagon"]}
-    kind = str(rng.choice(kinds.get(shape, ["round", "round", "square", "square", "octagon", "hexagon"])))
+    kind = pick(rng, kinds.get(shape, ["round", "round", "square", "square", "octagon", "hexagon"]))
     outline = cross_section(kind, rng.uniform(0.0, 1.0))
     half = rng.uniform(0.022, 0.075)
     depth = half
@@ -159,7 +161,7 @@ def _jug_handle(rng: Rng, depth: float, half: float, low: float, high: float) ->
 
 def _closing(rng: Rng, mouth: Mouth, height: float) -> JointSpec:
     """Joint of a cap that covers the neck: on a thread mostly; some slide off, some only turn."""
-    kind = str(rng.choice(["screw", "slide", "turn"], p=[0.62, 0.23, 0.15]))
+    kind = pick(rng, {"screw": 0.62, "slide": 0.23, "turn": 0.15})
     at = (0.0, 0.0, mouth.rim)
     if kind == "slide":
         return prismatic("body", UP, 0.0, height * rng.uniform(0.8, 3.0), at)
@@ -210,7 +212,7 @@ def _stopper(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     low, rim = mouth.rim - 0.7 * (mouth.rim - mouth.foot), mouth.rim + GAP
     lid = cylinder((0, 0, low), (0, 0, rim + 0.002), 0.9 * plug, plug, 18)
     r = mouth.radius
-    kind = str(rng.choice(["cork", "ball", "disc", "crystal", "knob"]))
+    kind = pick(rng, ["cork", "ball", "disc", "crystal", "knob"])
     if kind == "cork":
         lid += cylinder((0, 0, rim), (0, 0, rim + r * rng.uniform(0.4, 1.2)), r * rng.uniform(0.9, 1.1), r, 20)
     elif kind == "ball":

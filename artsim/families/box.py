@@ -12,7 +12,7 @@ from artsim.common.elementary import cos, sin
 from artsim.families.carton import LEAST_SHARES, MOST_SHARES, carton
 from artsim.families.details import bow_handle, knob, rounded_tray
 from artsim.families.proportions import unusual_sides, with_tails
-from artsim.making.assembly import Assembly, Rng, revolute
+from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.outlines import about
 from artsim.making.solids import Solid, box, cylinder, frame, hull, posts, tray, union
 
@@ -123,7 +123,7 @@ def _interior(rng: Rng, x: float, y: float, height: float, wall: float, radius: 
 
 def _feet(rng: Rng, x: float, y: float, wall: float) -> Solid:
     """Plinth, blocks or balls below the corners, or nothing."""
-    kind = str(rng.choice(["none", "plinth", "blocks", "balls"], p=[0.5, 0.2, 0.2, 0.1]))
+    kind = pick(rng, {"none": 0.5, "plinth": 0.2, "blocks": 0.2, "balls": 0.1})
     drop = wall * rng.uniform(1.0, 3.0)
     if kind == "plinth":
         out = 0.0 if rng.random() < 0.3 else 0.8 * wall
@@ -140,7 +140,7 @@ def _lid(
     rng: Rng, x: float, y: float, seam: float, height: float, wall: float, radius: float, plain: bool
 ) -> tuple[Solid, float, bool]:
     """Lid above the seam, the top of its upright part, and whether a dome rises above that."""
-    kind = str(rng.choice(["flat", "hollow", "dome"], p=[0.35, 0.45, 0.2]))
+    kind = pick(rng, {"flat": 0.35, "hollow": 0.45, "dome": 0.2})
     if kind == "flat":
         thick = wall * rng.uniform(0.7, 1.5)
         over = rng.choice([0.0, rng.uniform(0.5, 1.2) * wall])

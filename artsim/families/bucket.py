@@ -12,7 +12,7 @@ import numpy as np
 from artsim.common.elementary import cos, hypot, power, sin
 from artsim.common.products import norm
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, Rng, revolute
+from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.solids import Solid, box, cylinder, ring, tube, vessel
 from artsim.model.kinematics import Array
 
@@ -96,7 +96,7 @@ def _swing(side: float, path: Array, thick: Array, profile: Array, outer: float,
 def _profile(rng: Rng, top: float, height: float) -> Array:
     """Outer radius and height, from the bottom up."""
     bottom = top * rng.uniform(0.6, 0.98)
-    kind = str(rng.choice(["taper", "steps", "belly", "foot"], p=[0.5, 0.2, 0.15, 0.15]))
+    kind = pick(rng, {"taper": 0.5, "steps": 0.2, "belly": 0.15, "foot": 0.15})
     if kind == "steps":
         bend = rng.uniform(0.6, 0.8)
         middle = bottom + (top - bottom) * bend
@@ -115,7 +115,7 @@ def _profile(rng: Rng, top: float, height: float) -> Array:
 def _rim(rng: Rng, top: float, height: float, wall: float, profile: Array) -> Solid:
     """Rolled rim, hoops around the side, and a spout."""
     solid = ring((0, 0, height), (0, 0, 1), top - wall - 0.001, top + rng.uniform(0.002, 0.006), 0.006, SIDES)
-    for share in rng.uniform(0.2, 0.8, int(rng.choice([0, 1, 2], p=[0.5, 0.35, 0.15]))):
+    for share in rng.uniform(0.2, 0.8, pick(rng, {0: 0.5, 1: 0.35, 2: 0.15})):
         radius = float(np.interp(share * height, profile[:, 1], profile[:, 0]))
         slack = np.abs(np.diff(profile[:, 0])).max() * 0.06
         solid += ring(

@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.families.lenses import Lens
-from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute, swivel
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute, swivel
 from artsim.making.outlines import FRONT, UP, about, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, prism, ring, tube
 from artsim.model.kinematics import Array
@@ -36,8 +36,9 @@ class Shell:
 
 def build(rng: Rng) -> Assembly:
     """A camera; its lens looks towards -X and is drawn in at rest, all covers are shut."""
-    kind = str(rng.choice(["compact", "reflex", "rangefinder", "instant", "camcorder", "swivel"],
-                          p=[0.26, 0.27, 0.17, 0.1, 0.12, 0.08]))  # fmt: skip
+    kind = pick(
+        rng, {"compact": 0.26, "reflex": 0.27, "rangefinder": 0.17, "instant": 0.1, "camcorder": 0.12, "swivel": 0.08}
+    )
     if kind == "camcorder":
         return _camcorder(rng)
     if kind == "swivel":
@@ -45,7 +46,7 @@ def build(rng: Rng) -> Assembly:
     shell = _shell(rng, kind)
     body, top = _body(rng, shell, kind)
     styles = {"compact": ["tubes"], "instant": ["tubes", "prime"]}
-    style = str(rng.choice(styles.get(kind, ["tubes", "prime", "zoom", "zoom"])))
+    style = pick(rng, styles.get(kind, ["tubes", "prime", "zoom", "zoom"]))
     lens = Lens(rng, (0.0, shell.lens_y, shell.lens_z), shell.lens_radius, style)
     camera = Assembly("body", body + lens.fixed, DENSITY)
     lens.add_to(camera)
@@ -173,7 +174,7 @@ def _dial(rng: Rng, foot: Array, radius: float) -> Solid:
 def _back(rng: Rng, camera: Assembly, shell: Shell) -> None:
     """A screen that swings or tilts, or buttons; and a door for the battery at the side."""
     half, depth, height = shell.half, shell.depth + 0.001, shell.height
-    kind = str(rng.choice(["fixed", "swing", "tilt", "back", "none"], p=[0.25, 0.25, 0.15, 0.1, 0.25]))
+    kind = pick(rng, {"fixed": 0.25, "swing": 0.25, "tilt": 0.15, "back": 0.1, "none": 0.25})
     y0, y1 = -0.92 * half, half * rng.uniform(0.2, 0.5)
     z0, z1 = height * rng.uniform(0.08, 0.14), height * rng.uniform(0.68, 0.8)
     thick = rng.uniform(0.002, 0.006)
@@ -193,7 +194,7 @@ def _back(rng: Rng, camera: Assembly, shell: Shell) -> None:
     if kind in ("fixed", "swing", "tilt", "none"):
         room = half - y1
         size = min(0.2 * room, 0.08 * height, 0.006)
-        style = str(rng.choice(["pad", "row", "none"], p=[0.4, 0.35, 0.25]))
+        style = pick(rng, {"pad": 0.4, "row": 0.35, "none": 0.25})
         y = 0.5 * (y1 + half)
         if style == "pad" and size > 0.001:
             z = 0.4 * height
@@ -237,7 +238,7 @@ def _camcorder(rng: Rng) -> Assembly:
     shell = Shell(half, depth, height, 0.0, height * rng.uniform(0.5, 0.62), min(half, 0.38 * height) * 0.92)
     body = box((0, -half, 0), (depth, half, height), fillet=rng.uniform(0.1, 0.6) * half,
                        axis=[None, 0, 1][int(rng.integers(3))])  # fmt: skip
-    lens = Lens(rng, (0.0, 0.0, shell.lens_z), shell.lens_radius, str(rng.choice(["tubes", "prime", "zoom"])))
+    lens = Lens(rng, (0.0, 0.0, shell.lens_z), shell.lens_radius, pick(rng, ["tubes", "prime", "zoom"]))
     if rng.random() < 0.5:  # a handle on top
         x0, x1, z = 0.1 * depth, 0.85 * depth, height + rng.uniform(0.02, 0.04)
         r = rng.uniform(0.004, 0.008)
@@ -281,7 +282,7 @@ def _camcorder(rng: Rng) -> Assembly:
 def _swivel(rng: Rng) -> Assembly:
     """A camera that turns and nods in a fork on a foot: for a desk, a wall, a ceiling."""
     r = rng.uniform(0.02, 0.06)
-    shape = str(rng.choice(["ball", "bullet", "box"]))
+    shape = pick(rng, ["ball", "bullet", "box"])
     thick = 0.14 * r
     reach = r + 0.002
     if shape == "ball":
@@ -304,7 +305,7 @@ def _swivel(rng: Rng) -> Assembly:
     neck = 0.3 * r
     fork += cylinder((0, 0, -sink - thick), (0, 0, -sink), 2.2 * thick, sections=14)
     foot = -sink - thick - GAP
-    kind = str(rng.choice(["disc", "column", "clip"]))
+    kind = pick(rng, ["disc", "column", "clip"])
     if kind == "clip":
         base = box(0.8 * r, r, (foot - 0.01, foot)) + box((0.4 * r, -0.7 * r, foot - 2 * r), (0.6 * r, 0.7 * r, foot))
     else:

@@ -7,8 +7,6 @@ drawers and doors, an axle that steers with a drawbar, a tailgate. One to fourte
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin
@@ -16,17 +14,16 @@ from artsim.families.details import front_handle, side_hinge
 from artsim.families.shopping_carts import shopping_cart
 from artsim.families.wagons import hand_cart, wagon
 from artsim.families.wheels import GAP, STEEL, Wheels, bar
-from artsim.making.assembly import Assembly, Rng, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
 from artsim.making.outlines import UP, about
 from artsim.making.solids import Solid, box, cylinder, hull_of, posts, tray, tube, union
 
 
 def build(rng: Rng) -> Assembly:
     """A cart that moves towards -X; whoever pushes it stands at +X. Everything is folded out and shut at rest."""
-    kinds: tuple[Callable[[Rng], Assembly], ...] = (
-        shopping_cart, _platform_trolley, _hand_truck, _service_trolley, _wheelbarrow, wagon, hand_cart
-    )  # fmt: skip
-    return kinds[int(rng.choice(len(kinds), p=[0.2, 0.15, 0.16, 0.2, 0.09, 0.1, 0.1]))](rng)
+    kinds = {shopping_cart: 0.2, _platform_trolley: 0.15, _hand_truck: 0.16, _service_trolley: 0.2, _wheelbarrow: 0.09,
+             wagon: 0.1, hand_cart: 0.1}  # fmt: skip
+    return pick(rng, kinds)(rng)
 
 
 def _platform_trolley(rng: Rng) -> Assembly:
@@ -42,7 +39,7 @@ def _platform_trolley(rng: Rng) -> Assembly:
             body += box((-0.46 * length, 0.4 * length), about(y * half, 0.006), (top - 0.001, top + 0.002))
     x_front, x_back = -0.5 * length + 2.0 * wheels.radius, 0.5 * length - 2.0 * wheels.radius
     spread = half - 1.6 * wheels.radius - 0.5 * wheels.wide
-    swivels = int(rng.choice([2, 4], p=[0.7, 0.3]))
+    swivels = pick(rng, {2: 0.7, 4: 0.3})
     spots = [(x_back, -spread), (x_back, spread), (x_front, -spread), (x_front, spread)]
     body += union(wheels.bracket(x, y, floor + 0.004) for x, y in spots[swivels:])
     r = rng.uniform(0.01, 0.016)
@@ -51,7 +48,7 @@ def _platform_trolley(rng: Rng) -> Assembly:
     x = 0.5 * length - 2.0 * r - 0.01
     folds = rng.random() < 0.75
     foot = top + 2.2 * r
-    kind = str(rng.choice(["bow", "ladder", "panel"]))
+    kind = pick(rng, ["bow", "ladder", "panel"])
     lift = foot if folds else top - 0.005
     bend = min(0.06, 0.4 * wide)
     handle = tube([(x, -wide, lift), (x, -wide, top + rise - bend), (x, -wide + bend, top + rise), (x, wide - bend,
@@ -87,7 +84,7 @@ def _hand_truck(rng: Rng) -> Assembly:
     r = rng.uniform(0.01, 0.016)
     x = 0.0
     slides = rng.random() < 0.45
-    shape = str(rng.choice(["bow", "bar", "grips"]))
+    shape = pick(rng, ["bow", "bar", "grips"])
     body = union(tube([(x, s * half, 0.02), (x, s * half, height)], r, 10) for s in (-1.0, 1.0))
     for share in np.linspace(0.08, 0.95 if slides else 0.75, int(rng.integers(3, 6))).tolist():
         z = share * height
@@ -163,7 +160,7 @@ def _service_trolley(rng: Rng) -> Assembly:
         edges = np.linspace(base + wall, top - wall, rows + 1)
         face = rng.uniform(0.01, 0.018)
         doors = rows == 1 or rng.random() < 0.35  # in the top row
-        kind = str(rng.choice(["bar", "bow", "flat"]))
+        kind = pick(rng, ["bar", "bow", "flat"])
         for row in range(rows):
             z0, z1 = float(edges[row]) + 0.002, float(edges[row + 1]) - 0.002
             if row < rows - 1:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.families.proportions import unusual_sides
-from artsim.making.assembly import Assembly, JointSpec, Rng, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, pick, revolute
 from artsim.making.solids import Solid, box, frame, hull, tray
 from artsim.model.kinematics import Array
 
@@ -30,8 +30,9 @@ def carton(rng: Rng) -> Assembly:
     x, y = depth / 2, width / 2
     result = Assembly(density=150.0)
     result.add("body", _carton_body(rng, x, y, height, wall))
-    kind = str(rng.choice(["one", "two", "mitred", "long", "short", "wheel", "inner"],
-                          p=[0.12, 0.25, 0.14, 0.16, 0.11, 0.1, 0.12]))  # fmt: skip
+    kind = pick(
+        rng, {"one": 0.12, "two": 0.25, "mitred": 0.14, "long": 0.16, "short": 0.11, "wheel": 0.1, "inner": 0.12}
+    )
     flaps = _flaps(rng, kind, x, y, wall, height)
     limit = np.deg2rad(_limit(rng, 100.0))
     for number, (side, inward, outline) in enumerate(flaps):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import SIDE, UP
 from artsim.making.solids import Solid, box, cylinder, frame, hull_of, ring, tube
 from artsim.model.kinematics import Array
@@ -20,7 +20,7 @@ GAP = 0.0025
 
 def build(rng: Rng) -> Assembly:
     """A chair; one sits down facing -X. At rest the seat is at its lowest and faces forward."""
-    legs = int(rng.choice([0, 3, 4, 5, 6], p=[0.15, 0.07, 0.18, 0.5, 0.1]))  # none: a disc
+    legs = pick(rng, {0: 0.15, 3: 0.07, 4: 0.18, 5: 0.5, 6: 0.1})  # none: a disc
     span = rng.uniform(0.22, 0.36)
     castors = legs > 2 and rng.random() < 0.75
     lifted = rng.random() < 0.7

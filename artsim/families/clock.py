@@ -8,15 +8,13 @@ parts move. Hands turn freely about the middle of the face, clockwise as seen fr
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.families.clock_faces import CLOCKWISE, add_hands, dial_plate, glass_door, outline, pendulum, rim
 from artsim.families.details import side_hinge
 from artsim.families.hanging_clocks import cuckoo_clock, pendulum_clock, wall_clock
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import FRONT, about
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull_of, prism, ring, tube, union
 
@@ -26,17 +24,16 @@ DENSITY = 500.0
 
 def build(rng: Rng) -> Assembly:
     """A clock; its face looks towards -X and the pendulum hangs straight at rest."""
-    kinds: tuple[Callable[[Rng], Assembly], ...] = (
-        wall_clock, pendulum_clock, _mantel_clock, _longcase_clock, _alarm_clock, cuckoo_clock, _watch
-    )  # fmt: skip
-    return kinds[int(rng.choice(len(kinds), p=[0.24, 0.16, 0.16, 0.13, 0.15, 0.08, 0.08]))](rng)
+    kinds = {wall_clock: 0.24, pendulum_clock: 0.16, _mantel_clock: 0.16, _longcase_clock: 0.13, _alarm_clock: 0.15,
+             cuckoo_clock: 0.08, _watch: 0.08}  # fmt: skip
+    return pick(rng, kinds)(rng)
 
 
 def _mantel_clock(rng: Rng) -> Assembly:
     """A case that stands: a block, an arch, a tambour, a house, or a drum on feet."""
     radius = rng.uniform(0.04, 0.1)
     deep = radius * rng.uniform(0.7, 1.5)
-    kind = str(rng.choice(["block", "arch", "tambour", "house", "drum", "lancet"]))
+    kind = pick(rng, ["block", "arch", "tambour", "house", "drum", "lancet"])
     half = radius * rng.uniform(1.12, 1.5)
     low = -radius * rng.uniform(1.12, 1.8)
     body = dial_plate(rng, radius)
@@ -121,7 +118,7 @@ def _longcase_clock(rng: Rng) -> Assembly:
     bottom = low - length
     body = dial_plate(rng, radius) + box((0.002, deep), hood, (low, hood))
     body += rim(rng, 1.005 * radius, 0.08 * radius, 0.01 + 0.05 * radius)
-    crest = str(rng.choice(["flat", "gable", "arch", "swan"]))
+    crest = pick(rng, ["flat", "gable", "arch", "swan"])
     if crest == "gable":
         body += prism([(-1.1 * hood, hood), (1.1 * hood, hood), (0, hood * rng.uniform(1.3, 1.7))], -0.02, deep, 0)
     elif crest == "arch":
@@ -164,7 +161,7 @@ def _alarm_clock(rng: Rng) -> Assembly:
     middle = 0.5 * deep
     if not bells:
         tall = rng.uniform(0.9, 1.3)
-        kind = str(rng.choice(["square", "wedge", "drum"]))
+        kind = pick(rng, ["square", "wedge", "drum"])
         if kind == "drum":
             body += cylinder((0.002, 0, 0), (deep, 0, 0), half, sections=32)
             body += box((0.1 * deep, 0.9 * deep), 0.7 * half, (-1.08 * half, -0.5 * half))

@@ -6,7 +6,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.families.details import side_hinge
-from artsim.making.assembly import Assembly, Rng, continuous
+from artsim.making.assembly import Assembly, Rng, continuous, pick
 from artsim.making.outlines import FRONT, about
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull, hull_of, prism, revolved
 from artsim.model.kinematics import Array
@@ -29,7 +29,7 @@ def outline(kind: str, half: float, tall: float = 1.0) -> Array:
 
 def marks(rng: Rng, radius: float) -> Solid:
     """Marks of the hours on a face at x = 0: bars, dots, or four large ones."""
-    kind = str(rng.choice(["bars", "dots", "four", "mixed"]))
+    kind = pick(rng, ["bars", "dots", "four", "mixed"])
     solid = Solid()
     size = radius * rng.uniform(0.02, 0.04)
     long = radius * rng.uniform(0.05, 0.11)
@@ -54,7 +54,7 @@ def marks(rng: Rng, radius: float) -> Solid:
 
 def add_hands(rng: Rng, clock: Assembly, radius: float, parent: str) -> float:
     """Add hour, minute and by chance a second hand before a face at x = 0; returns where they end in front."""
-    kind = str(rng.choice(["bar", "lance", "spade", "dart"]))
+    kind = pick(rng, ["bar", "lance", "spade", "dart"])
     thick = max(0.012 * radius, 0.0008)
     gap = max(0.006 * radius, 0.0005)
     wide = radius * rng.uniform(0.035, 0.1)
@@ -118,7 +118,7 @@ def pendulum(rng: Rng, x: float, top: float, length: float, room: float) -> tupl
     z = top - length + bob
     rod = max(0.008 * length, 0.0012)
     solid = cylinder((x - 0.5 * rod, 0, top), (x - 0.5 * rod, 0, z), rod, sections=8)
-    kind = str(rng.choice(["disc", "lens", "bar", "drop"]))
+    kind = pick(rng, ["disc", "lens", "bar", "drop"])
     thick = max(0.12 * bob, 0.002)
     if kind == "disc":
         solid += cylinder((x - thick, 0, z), (x + thick, 0, z), bob, sections=24)

@@ -12,7 +12,7 @@ import numpy as np
 
 from artsim.common.elementary import power
 from artsim.families.details import dial
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import FRONT, about, lifted, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, hull, hull_of, ring, tray, tube, union, vessel
 
@@ -21,7 +21,7 @@ GAP = 0.0015
 
 def build(rng: Rng) -> Assembly:
     """An espresso, a drip or a pod machine, a percolator or an urn."""
-    return (_espresso, _drip, _pod, _percolator, _urn)[int(rng.choice(5, p=[0.29, 0.29, 0.14, 0.14, 0.14]))](rng)
+    return pick(rng, {_espresso: 0.29, _drip: 0.29, _pod: 0.14, _percolator: 0.14, _urn: 0.14})(rng)
 
 
 def _drip_tray(rng: Rng, machine: Assembly, x0: float, depth: float, y: float, low: float, high: float) -> None:

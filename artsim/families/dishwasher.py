@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.common.elementary import hypot
 from artsim.families.details import dial, flat_handle, front_handle, push_button, wire_shelf
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, posts, tray, union
 
 GAP = 0.002
@@ -78,7 +78,7 @@ def build(rng: Rng) -> Assembly:
         hinge_z=plinth + (0.0 if flush else rng.uniform(0.0, 0.012)),
         liner=rng.uniform(0.005, 0.025) if rng.random() < 0.75 else 0.0,
     )
-    racks = str(rng.choice(["none", "fixed", "sliding"], p=[0.4, 0.4, 0.2]))
+    racks = pick(rng, {"none": 0.4, "fixed": 0.4, "sliding": 0.2})
     machine = Assembly()
     body = _body(rng, shape, strip, flush, flanked, compact)
     if racks == "fixed":
@@ -98,7 +98,7 @@ def build(rng: Rng) -> Assembly:
 
 def _drawers(rng: Rng) -> Assembly:
     """Tubs that slide out behind a full front, one above the other."""
-    count = int(rng.choice([1, 2], p=[0.65, 0.35]))
+    count = pick(rng, {1: 0.65, 2: 0.35})
     half, depth, wall = 0.5 * rng.uniform(0.5, 0.64), rng.uniform(0.42, 0.62), rng.uniform(0.012, 0.03)
     plinth = rng.uniform(0.015, 0.1)
     tall = rng.uniform(0.4, 0.75) if count == 1 else rng.uniform(0.34, 0.42)
@@ -211,7 +211,7 @@ def _controls(rng: Rng, machine: Assembly, s: Shape) -> None:
 
 def _door(rng: Rng, s: Shape, controls_above: bool, machine: Assembly) -> Solid:
     half, tall, x = s.half_door, s.top - s.bottom, -s.thick
-    kind = str(rng.choice(["bar", "bow", "flat", "pocket", "edge", "none"], p=[0.24, 0.24, 0.16, 0.18, 0.1, 0.08]))
+    kind = pick(rng, {"bar": 0.24, "bow": 0.24, "flat": 0.16, "pocket": 0.18, "edge": 0.1, "none": 0.08})
     machine.record(handles=kind in ("bar", "bow", "flat", "edge"))
     band = rng.uniform(0.08, 0.14) if not controls_above and rng.random() < 0.5 else 0.0
     z = s.top - band - rng.uniform(0.03, 0.1)  # height of the handle

@@ -13,7 +13,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.details import front_handle, rounded_tray, side_hinge
 from artsim.families.vessels import GAP, Level, cap, cross_section, dome, moulded, neck, pump_head, ribs
-from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute, screw
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute, screw
 from artsim.making.outlines import UP, about, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union
 from artsim.model.kinematics import Array
@@ -24,8 +24,7 @@ CLEAR = 0.0015
 
 def build(rng: Rng) -> Assembly:
     """A dispenser, shut at rest; it gives towards -X."""
-    kinds = (_pump_bottle, _soap_box, _drink_jar, _water_cooler)
-    return kinds[int(rng.choice(len(kinds), p=[0.5, 0.18, 0.2, 0.12]))](rng)
+    return pick(rng, {_pump_bottle: 0.5, _soap_box: 0.18, _drink_jar: 0.2, _water_cooler: 0.12})(rng)
 
 
 # --- pumps -----------------------------------------------------------------------------------------------------------
@@ -33,9 +32,9 @@ def build(rng: Rng) -> Assembly:
 
 def _pump_bottle(rng: Rng) -> Assembly:
     """One bottle with a pump, or two or three alike side by side."""
-    count = int(rng.choice([1, 2, 3], p=[0.78, 0.15, 0.07]))
+    count = pick(rng, {1: 0.78, 2: 0.15, 3: 0.07})
     half, depth, height = rng.uniform(0.025, 0.06), rng.uniform(0.025, 0.06), rng.uniform(0.06, 0.24)
-    shape = str(rng.choice(["round", "round", "square", "square", "octagon", "hexagon", "flask"]))
+    shape = pick(rng, ["round", "round", "square", "square", "octagon", "hexagon", "flask"])
     if shape != "flask" and rng.random() < 0.6:
         depth = half
     outline = cross_section(shape, rng.uniform(0.0, 1.0))
@@ -65,7 +64,7 @@ def _pump_bottle(rng: Rng) -> Assembly:
     if count == 1 and rng.random() < 0.5:
         collar += ribs(outer, low + 0.002, high - 0.002, int(rng.integers(10, 20)), 0.07 * outer)
     pump = pump_head(rng, head, stem, size, reach, head - high + 0.004)
-    turning = str(rng.choice(["screw", "turn", "fixed"], p=[0.3, 0.4, 0.3]))
+    turning = pick(rng, {"screw": 0.3, "turn": 0.4, "fixed": 0.3})
     if turning == "fixed":
         for y in places:
             body += collar.moved((0, y, 0)) + cylinder((0, y, low - GAP), (0, y, low + wall), 0.99 * outer)
@@ -89,7 +88,7 @@ def _pump_bottle(rng: Rng) -> Assembly:
 
 def _bottle_levels(rng: Rng, depth: float, half: float, height: float, radius: float) -> list[Level]:
     """From the foot to the shoulder, where a round neck follows."""
-    kind = str(rng.choice(["straight", "cone", "belly", "waist", "foam", "step"]))
+    kind = pick(rng, ["straight", "cone", "belly", "waist", "foam", "step"])
     edge = rng.uniform(0.6, 0.95)
     shares = {
         "straight": [(0.0, 0.96), (0.03, 1.0), (0.9, 1.0), (0.97, edge)],
@@ -125,7 +124,7 @@ def _soap_box(rng: Rng) -> Assembly:
         upright = (low + 0.3 * (height - low), low + 0.8 * (height - low))
         cover += box((face - thick - 0.0015, face - thick + 0.002), 0.2 * half, upright, fillet=0.003, axis=0)
     dispenser = Assembly("body", body, DENSITY)
-    style = str(rng.choice(["bar", "lever", "button", "twin", "sensor"]))
+    style = pick(rng, ["bar", "lever", "button", "twin", "sensor"])
     if style == "sensor":  # nothing to press, and the cover swings down
         down_at = (face - 0.005, 0.0, low + 0.001)  # before the foot of the box
         dispenser.add("lid", cover, revolute("body", (0, -1, 0), down_at, 0.0, rng.uniform(0.6, 1.5)))
@@ -174,10 +173,10 @@ def _drink_jar(rng: Rng) -> Assembly:
     """A jar or an urn with taps near its foot, on a stand or on feet."""
     half, height = rng.uniform(0.08, 0.15), rng.uniform(0.18, 0.42)
     foot = rng.uniform(0.06, 0.2)
-    shape = str(rng.choice(["round", "round", "round", "square", "octagon", "hexagon"]))
+    shape = pick(rng, ["round", "round", "round", "square", "octagon", "hexagon"])
     outline = cross_section(shape, rng.uniform(0.0, 1.0))
     mouth = rng.uniform(0.55, 0.95)
-    kind = str(rng.choice(["drum", "urn", "keg"]))
+    kind = pick(rng, ["drum", "urn", "keg"])
     shares = {
         "drum": [(0.0, 0.95), (0.03, 1.0), (0.9, 1.0), (1.0, mouth)],
         "urn": [(0.0, 0.6), (0.15, 0.8), (0.5, 1.0), (0.8, 0.97), (1.0, mouth)],
@@ -190,7 +189,7 @@ def _drink_jar(rng: Rng) -> Assembly:
     top = foot + height
     z = foot + height * rng.uniform(0.08, 0.16)
     wide = float(np.interp(z, [v[0] for v in levels], [v[1] for v in levels]))
-    count = int(rng.choice([1, 2], p=[0.8, 0.2]))
+    count = pick(rng, {1: 0.8, 2: 0.2})
     spots = [0.0] if count == 1 else [-0.33 * wide, 0.33 * wide]
     r = rng.uniform(0.008, 0.012)
     reach = rng.uniform(0.03, 0.06) + r
@@ -221,7 +220,7 @@ def _drink_jar(rng: Rng) -> Assembly:
     else:
         joint = prismatic("body", UP, 0.0, radius * rng.uniform(0.3, 1.2), (0, 0, top))
     dispenser.add("lid", lid, joint)
-    style = str(rng.choice(["lever", "wing", "flip"]))
+    style = pick(rng, ["lever", "wing", "flip"])
     long = rng.uniform(0.03, 0.06)
     for number, y in enumerate(spots):
         at = np.array([out, y, z + rise + 0.001])
@@ -250,7 +249,7 @@ def _tap_handle(style: str, at: Array, r: float, long: float, rng: Rng) -> tuple
 
 def _stand(rng: Rng, wide: float, foot: float) -> Solid:
     """Legs with a ring, a pedestal, or a plinth."""
-    kind = str(rng.choice(["legs", "pedestal", "plinth"]))
+    kind = pick(rng, ["legs", "pedestal", "plinth"])
     if kind == "plinth":
         return cylinder((0, 0, 0), (0, 0, foot + 0.002), wide * rng.uniform(0.9, 1.05), 0.9 * wide)
     if kind == "pedestal":
@@ -289,9 +288,9 @@ def _water_cooler(rng: Rng) -> Assembly:
     else:
         body += box(depth, half, (0.0, shelf), fillet=0.02, axis=2)
     body += box((-depth - 0.02, niche + 0.01), 0.6 * half, (shelf - 0.015, shelf + 0.008), fillet=0.006)
-    count = int(rng.choice([2, 3], p=[0.75, 0.25]))
+    count = pick(rng, {2: 0.75, 3: 0.25})
     spots = (np.linspace(-1.0, 1.0, count) * 0.4 * half).tolist()
-    style = str(rng.choice(["lever", "button", "tap"]))
+    style = pick(rng, ["lever", "button", "tap"])
     z = roof - (0.075 if style == "tap" else 0.02)
     for number, y in enumerate(spots):
         nose = niche - 0.045
@@ -319,7 +318,7 @@ def _water_cooler(rng: Rng) -> Assembly:
         left = rng.random() < 0.5
         panel = box((face - thick, face), half - 0.004, (0.03, shelf - 0.033), fillet=0.004)
         y = (half if left else -half) * 0.6 * -1.0
-        panel += front_handle(str(rng.choice(["bar", "bow", "flat"])), (face - thick, y, 0.5 * shelf),
+        panel += front_handle(pick(rng, ["bar", "bow", "flat"]), (face - thick, y, 0.5 * shelf),
                               (face - thick, y, 0.8 * shelf), 0.025, 0.005)  # fmt: skip
         edge = (half - 0.004) * (1.0 if left else -1.0)
         cooler.add("door", panel, side_hinge(face - thick, edge, rng.uniform(1.2, 1.9), left), density=300.0)

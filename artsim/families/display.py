@@ -13,7 +13,7 @@ from artsim.common.elementary import arcsin, cos, hypot, sin
 from artsim.families.details import dial
 from artsim.families.keys import Face, add_key, front_face, key_outline
 from artsim.families.screens import Panel, draw_panel, screen
-from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import FRONT, UP, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, ring, tube
 from artsim.model.kinematics import Array
@@ -23,9 +23,8 @@ GAP = 0.0015
 
 def build(rng: Rng) -> Assembly:
     """A display; upright and at its lowest, no key pressed at rest."""
-    kind = str(rng.choice(["stand", "feet", "tube", "easel"], p=[0.58, 0.14, 0.16, 0.12]))
     display = Assembly()
-    {"stand": _on_stand, "feet": _on_feet, "tube": _tube, "easel": _on_easel}[kind](rng, display)
+    pick(rng, {_on_stand: 0.58, _on_feet: 0.14, _tube: 0.16, _on_easel: 0.12})(rng, display)
     return display
 
 
@@ -35,7 +34,7 @@ def _keys(rng: Rng, display: Assembly, parent: str, face: Face, half: float, siz
         return 0
     count = int(rng.integers(1, 7))
     wide = min(rng.uniform(0.8, 2.5) * size, 0.028)
-    kind = str(rng.choice(["round", "square", "pill"]))
+    kind = pick(rng, ["round", "square", "pill"])
     side, travel = float(rng.choice([-1.0, 0.0, 1.0])), rng.uniform(0.0008, 0.0015)
     pitch = 1.3 * max(wide, size)
     middle = side * (half - 0.5 * count * pitch - 0.01)
@@ -48,7 +47,7 @@ def _keys(rng: Rng, display: Assembly, parent: str, face: Face, half: float, siz
 
 def _foot(rng: Rng, half: float, depth: float, thick: float) -> Solid:
     """What stands on the table, below z = ``thick``; the middle of it is solid."""
-    kind = str(rng.choice(["plate", "disc", "legs", "ring", "tapered", "arc"], p=[0.27, 0.22, 0.15, 0.08, 0.18, 0.1]))
+    kind = pick(rng, {"plate": 0.27, "disc": 0.22, "legs": 0.15, "ring": 0.08, "tapered": 0.18, "arc": 0.1})
     back = 0.45 * depth
     front = back - depth
     if kind == "disc":
@@ -97,7 +96,7 @@ class _Chain:
 def _on_stand(rng: Rng, display: Assembly) -> None:
     """Screens on a column that turns, slides, tilts and turns to portrait, or some of these."""
     panel = draw_panel(rng)
-    count = int(rng.choice([1, 2, 3], p=[0.84, 0.1, 0.06])) if not panel.bend and panel.half < 0.3 else 1
+    count = pick(rng, {1: 0.84, 2: 0.1, 3: 0.06}) if not panel.bend and panel.half < 0.3 else 1
     swivels, slides, tilts, pivots = (bool(v) for v in rng.random(4) < (0.5, 0.45, 0.85, 0.3))
     tilts = tilts or count > 1 or not (swivels or slides)
     pivots = pivots and count == 1 and not panel.bend
@@ -168,7 +167,7 @@ def _forward_tilt(reach: float, below: float, axis: float, column: float) -> flo
 
 def _column(rng: Rng, radius: float, low: float, high: float, free: bool) -> Solid:
     """The upright of a stand; a square one, unless its shape is free."""
-    kind = str(rng.choice(["square", "round", "wide", "tapered"])) if free else "square"
+    kind = pick(rng, ["square", "round", "wide", "tapered"]) if free else "square"
     if kind == "round":
         return cylinder((0, 0, low), (0, 0, high), radius, sections=20)
     wide = radius * {"square": 1.0, "wide": rng.uniform(1.5, 4.0), "tapered": 1.0}[kind]
@@ -196,7 +195,7 @@ def _head(
 
 def _finish_screen(rng: Rng, chain: _Chain, panel: Panel, at: Array, number: int) -> None:
     """Add the panel to the chain's last part, finish that, and put keys on the first one."""
-    chin = rng.uniform(0.0, 0.16) * panel.rise * rng.choice([0.0, 1.0], p=[0.4, 0.6])
+    chin = rng.uniform(0.0, 0.16) * panel.rise * pick(rng, {0.0: 0.4, 1.0: 0.6})
     chain.solid += screen(rng, panel, chin).moved(at)
     name = chain.finish()
     if number > 0:

@@ -15,7 +15,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.details import bar_handle, grid_panel, swing_limits
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, Rng, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull, ring, tube, union
 from artsim.model.kinematics import Array
 
@@ -40,7 +40,7 @@ class Style:
 
 def build(rng: Rng) -> Assembly:
     """A door, mostly closed at rest."""
-    kind = str(rng.choice(["single", "double", "sliding"], p=[0.62, 0.23, 0.15]))
+    kind = pick(rng, {"single": 0.62, "double": 0.23, "sliding": 0.15})
     width = rng.uniform(0.5, 1.4) * (1.0 if kind == "single" else rng.uniform(1.5, 1.9))
     height = rng.uniform(1.6, 3.0)
     depth, jamb = with_tails(rng, (0.07, 0.42), (0.07, 0.75), 0.15), rng.uniform(0.03, 0.25)
@@ -99,14 +99,14 @@ def _sliding(rng: Rng, door: Assembly, body: Solid, width: float, height: float,
 
 
 def _style(rng: Rng, kind: str) -> Style:
-    look = str(rng.choice(["flush", "panels", "glass", "half"], p=[0.3, 0.4, 0.2, 0.1]))
+    look = pick(rng, {"flush": 0.3, "panels": 0.4, "glass": 0.2, "half": 0.1})
     thickness = rng.uniform(0.035, 0.05)
     shares: tuple[float, ...] = ()
     if look != "flush":
         layouts: list[tuple[float, ...]] = [(), (0.45,), (0.42, 0.5), (0.3, 0.62), (0.4, 0.75), (0.2, 0.4, 0.6, 0.8)]
         shares = layouts[int(rng.integers(len(layouts)))]
     boards = {"flush": thickness, "panels": 0.012, "glass": 0.006, "half": 0.012}
-    handles = ["lever", "knob", "pull", "none"]
+    handles = {"lever": 0.42, "knob": 0.3, "pull": 0.13, "none": 0.15}
     return Style(
         thickness=thickness,
         stile=rng.uniform(0.085, 0.14),
@@ -114,7 +114,7 @@ def _style(rng: Rng, kind: str) -> Style:
         rows=shares,
         board=boards[look],
         raised=look == "panels" and rng.random() < 0.6,
-        handle="pull" if kind == "sliding" else str(rng.choice(handles, p=[0.42, 0.3, 0.13, 0.15])),
+        handle="pull" if kind == "sliding" else pick(rng, handles),
         handle_z=rng.uniform(0.95, 1.1),
     )
 
@@ -129,9 +129,7 @@ def _frame(rng: Rng, width: float, height: float, depth: float, jamb: float, sty
         if stop + 0.012 < x1:
             bars = [0.014, 0.014, 0.0, 0.014]
             solid += frame((stop, -y - 0.002, 0), (stop + 0.011, y + 0.002, height + 0.002), bars, 1, 2)
-    extra = str(
-        rng.choice(["none", "casing", "fanlight", "side light", "arch", "wall"], p=[0.27, 0.2, 0.12, 0.11, 0.1, 0.2])
-    )
+    extra = pick(rng, {"none": 0.27, "casing": 0.2, "fanlight": 0.12, "side light": 0.11, "arch": 0.1, "wall": 0.2})
     if extra == "casing":
         wide = rng.uniform(0.05, 0.1)
         for face in (x0 - 0.009, x1 - 0.002):

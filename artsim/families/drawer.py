@@ -14,7 +14,7 @@ import numpy as np
 
 from artsim.families.details import front_handle, knob, panel
 from artsim.families.proportions import unusual_sides, with_tails
-from artsim.making.assembly import Assembly, Rng, prismatic
+from artsim.making.assembly import Assembly, Rng, pick, prismatic
 from artsim.making.outlines import FRONT, Vector
 from artsim.making.solids import Solid, box, cylinder, frame, hull_of, tray, tube, union
 from artsim.model.kinematics import Array
@@ -119,16 +119,15 @@ class _Furniture(Assembly):
 def build(rng: Rng) -> Assembly:
     """A body with drawers that slide out towards -X, closed at rest."""
     furniture = _Furniture(_style(rng))
-    kinds = (_chest, _table, _desk)
-    kinds[rng.choice(3, p=[0.45, 0.3, 0.25])](rng, furniture)
+    pick(rng, {_chest: 0.45, _table: 0.3, _desk: 0.25})(rng, furniture)
     return furniture
 
 
 def _style(rng: Rng) -> _Style:
     return _Style(
-        front=str(rng.choice(["slab", "shaker", "raised", "planks"], p=[0.7, 0.15, 0.1, 0.05])),
+        front=pick(rng, {"slab": 0.7, "shaker": 0.15, "raised": 0.1, "planks": 0.05}),
         overlay=bool(rng.random() < 0.5),
-        handle=str(rng.choice(["bar", "knob", "bow", "two knobs", "none"], p=[0.24, 0.24, 0.16, 0.08, 0.28])),
+        handle=pick(rng, {"bar": 0.24, "knob": 0.24, "bow": 0.16, "two knobs": 0.08, "none": 0.28}),
         size=rng.uniform(0.15, 0.7),
         reach=rng.uniform(0.015, 0.04),
         rise=rng.uniform(-0.2, 0.3),
@@ -140,7 +139,7 @@ def _style(rng: Rng) -> _Style:
 
 def _chest(rng: Rng, furniture: _Furniture) -> None:
     """One case from side to side; some of its rows may be open, or have fronts that do not move."""
-    columns = int(rng.choice([1, 2, 3], p=[0.68, 0.23, 0.09]))
+    columns = pick(rng, {1: 0.68, 2: 0.23, 3: 0.09})
     rows = int(rng.integers(1, max(2, 6 // columns) + 1))
     width = columns * rng.uniform(0.28, 0.6) if columns > 1 else rng.uniform(0.3, 0.9)
     depth, height = rng.uniform(0.3, 0.65), rows * rng.uniform(0.1, 0.28)
@@ -158,7 +157,7 @@ def _chest(rng: Rng, furniture: _Furniture) -> None:
     contents = ["drawer"] * rows
     if rows > 1 and rng.random() < 0.3:  # the lower rows, the commonest first
         others = int(rng.integers(1, rows))
-        contents[:others] = [str(rng.choice(["open", "fixed"], p=[0.7, 0.3]))] * others
+        contents[:others] = [pick(rng, {"open": 0.7, "fixed": 0.3})] * others
     furniture.add_case(
         (x0, -y, legs), (x1, y, top), wall,
         _widths(rng, -y + wall, y - wall, columns), _shares(rng, legs + wall, top - wall, rows), contents,
@@ -198,7 +197,7 @@ def _table(rng: Rng, furniture: _Furniture) -> None:
     span = max(between * (1.0 if rng.random() < 0.6 else rng.uniform(0.4, 0.9)), _NARROWEST / 2)
     middle = 0.0 if rng.random() < 0.8 else rng.choice([-1.0, 1.0]) * (between - span)
     columns = int(np.clip(round(2 * span / rng.uniform(0.25, 0.7)), 1, 4))
-    sides = str(rng.choice(["front", "back", "both"], p=[0.82, 0.08, 0.1]))
+    sides = pick(rng, {"front": 0.82, "back": 0.08, "both": 0.1})
     deepest = depth - 2 * over - 2 * inset - wall
     share = rng.uniform(0.3, 0.47) if sides == "both" else rng.uniform(0.45, 1.0)
     if sides == "both" and deepest < 2.2 * _SHALLOWEST:
@@ -235,7 +234,7 @@ def _desk(rng: Rng, furniture: _Furniture) -> None:
     x0, x1, y, top = -depth / 2 + over, depth / 2 - over, width / 2 - over, height - thick
     furniture.body += _top(rng, depth, width, top, height)
     pedestal = min(rng.uniform(0.28, 0.45), 0.4 * width)
-    sides = [(-1,), (1,), (-1, 1)][rng.choice(3, p=[0.35, 0.35, 0.3])]
+    sides = pick(rng, {(-1,): 0.35, (1,): 0.35, (-1, 1): 0.3})
     on_legs = rng.random() < 0.4
     leg = rng.uniform(0.035, 0.07)
     low = height * rng.uniform(0.1, 0.6) if on_legs else (0.0 if rng.random() < 0.5 else rng.uniform(0.03, 0.1))
@@ -275,7 +274,7 @@ def _desk(rng: Rng, furniture: _Furniture) -> None:
         )
     if rng.random() < 0.5:
         flat = rng.uniform(0.08, 0.13)
-        columns = int(rng.choice([1, 2], p=[0.7, 0.3]))
+        columns = pick(rng, {1: 0.7, 2: 0.3})
         edges = np.linspace(left + wall, right - wall, columns + 1)
         furniture.add_case(
             (x0, left, top - flat), (x1 - max(0.058, rng.uniform(0.05, 0.3) * depth), right, top + 0.001), wall, edges,
@@ -315,7 +314,7 @@ def _top(rng: Rng, depth: float, width: float, low: float, high: float) -> Solid
 
 def _legs(rng: Rng, x0: float, x1: float, y: float, height: float, size: float) -> Solid:
     """Four legs with their outer edges on a rectangle: square or round, straight, tapered or turned."""
-    kind = str(rng.choice(["square", "tapered", "round", "turned"], p=[0.35, 0.25, 0.25, 0.15]))
+    kind = pick(rng, {"square": 0.35, "tapered": 0.25, "round": 0.25, "turned": 0.15})
     taper = rng.uniform(0.45, 0.9)
     half, middle = size / 2, 0.5 * (x0 + x1)
     solid = Solid()

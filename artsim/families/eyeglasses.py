@@ -14,7 +14,7 @@ import numpy as np
 
 from artsim.common.elementary import arcsin, cos, hypot, power, sin
 from artsim.common.products import norm
-from artsim.making.assembly import Assembly, Rng, revolute
+from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.outlines import about
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, loft, tube, union
 from artsim.model.kinematics import Array
@@ -54,7 +54,7 @@ class Front:
 
 def build(rng: Rng) -> Assembly:
     """Eyeglasses, open at rest; each temple turns inwards about its hinge."""
-    style = str(rng.choice(["wire", "thick", "half", "rimless", "shield"], p=[0.27, 0.36, 0.15, 0.08, 0.14]))
+    style = pick(rng, {"wire": 0.27, "thick": 0.36, "half": 0.15, "rimless": 0.08, "shield": 0.14})
     size = rng.uniform(0.87, 1.13) if rng.random() < 0.85 else rng.uniform(0.75, 0.9)
     outline = size * _outline(rng)
     apart = size * rng.uniform(14.0, 24.0) * MM + float(np.ptp(outline[:, 0]))
@@ -111,7 +111,7 @@ def build(rng: Rng) -> Assembly:
 
 def _outline(rng: Rng) -> Array:
     """(N, 2) y and z of the rim of the lens at +y, the outer side at larger y."""
-    kind = str(rng.choice(["round", "rectangular", "aviator", "cat", "panto"]))
+    kind = pick(rng, ["round", "rectangular", "aviator", "cat", "panto"])
     wide = {"round": (42, 52), "aviator": (54, 62)}.get(kind, (47, 58))
     tall = {"round": (0.9, 1.0), "rectangular": (0.48, 0.75), "aviator": (0.78, 0.92), "cat": (0.6, 0.82)}
     exponent = {"round": (2.0, 2.2), "rectangular": (2.8, 5.0)}.get(kind, (2.2, 3.0))

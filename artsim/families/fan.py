@@ -12,7 +12,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.common.products import norm
-from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import FRONT, UP, circle
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, loft, ring, tube, union
 
@@ -21,10 +21,7 @@ GAP = 0.002
 
 def build(rng: Rng) -> Assembly:
     """A fan that blows towards -X (a ceiling fan: downward)."""
-    kind = rng.choice(["head", "ceiling", "box"], p=[0.7, 0.17, 0.13])
-    if kind == "ceiling":
-        return _ceiling_fan(rng)
-    return _box_fan(rng) if kind == "box" else _head_fan(rng)
+    return pick(rng, {_head_fan: 0.7, _ceiling_fan: 0.17, _box_fan: 0.13})(rng)
 
 
 def _head_fan(rng: Rng) -> Assembly:

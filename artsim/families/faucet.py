@@ -12,7 +12,7 @@ import numpy as np
 from artsim.common.elementary import arcsin, cos, sin
 from artsim.common.products import unit
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, Rng, revolute, screw, swivel
+from artsim.making.assembly import Assembly, Rng, pick, revolute, screw, swivel
 from artsim.making.outlines import FRONT, UP
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, tube, union
 from artsim.model.kinematics import Array
@@ -23,8 +23,8 @@ BRASS = 3000.0  # kg/m^3, as the pieces are solid and real ones are hollow
 
 def build(rng: Rng) -> Assembly:
     """A faucet; the water comes out towards -X. All handles are shut at rest."""
-    layouts = (_basin_mixer, _kitchen_mixer, _three_piece, _pillar_tap, _wall_tap)
-    return layouts[int(rng.choice(5, p=[0.34, 0.26, 0.2, 0.1, 0.1]))](rng)
+    layouts = {_basin_mixer: 0.34, _kitchen_mixer: 0.26, _three_piece: 0.2, _pillar_tap: 0.1, _wall_tap: 0.1}
+    return pick(rng, layouts)(rng)
 
 
 def _basin_mixer(rng: Rng) -> Assembly:
@@ -188,7 +188,7 @@ def _body(rng: Rng, radius: float, height: float) -> tuple[Solid, float]:
     """Upright body on a foot; and the height of its top."""
     foot = radius * rng.uniform(1.1, 1.5)
     thick = rng.uniform(0.004, 0.012)
-    kind = rng.choice(["round", "tapered", "square", "turned"], p=[0.4, 0.25, 0.15, 0.2])
+    kind = pick(rng, {"round": 0.4, "tapered": 0.25, "square": 0.15, "turned": 0.2})
     if kind == "square":
         s = 0.95 * radius
         solid = box(s, s, (0, height), fillet=0.25 * s, axis=2)
@@ -206,7 +206,7 @@ def _gooseneck(rng: Rng, foot: Array, r: float, reach: float, tip: float) -> Sol
     """High spout that stands on ``foot``, bends over and ends at height ``tip``."""
     z0 = foot[2] + GAP
     bow = 0.5 * reach
-    kind = rng.choice(["bow", "swan", "square"], p=[0.6, 0.25, 0.15])
+    kind = pick(rng, {"bow": 0.6, "swan": 0.25, "square": 0.15})
     if kind == "square":
         crest = tip + rng.uniform(0.02, 0.05)
         points = [(0, z0), (0, crest - 0.02), (0.006, crest - 0.006), (0.02, crest)]
@@ -244,7 +244,7 @@ def _handle(rng: Rng, pivot: Array, axis: Array, start: Array, radius: float, le
         Whether the hub is the top of a body, so that it is never a cross.
     """
     foot = pivot + GAP * axis
-    kind = str(rng.choice(["rod", "paddle", "ball", "knob"], p=[0.4, 0.35, 0.12, 0.13]))
+    kind = pick(rng, {"rod": 0.4, "paddle": 0.35, "ball": 0.12, "knob": 0.13})
     if kind == "knob" and not crowned:
         return _knob(rng, pivot, axis, min(1.5 * radius, 0.4 * length))
     tall = radius * rng.uniform(0.9, 1.7)

@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.common.elementary import arctan2, cos, hypot, sin
 from artsim.common.products import norm, unit
-from artsim.making.assembly import Assembly, Rng, revolute
+from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.outlines import SIDE, Vector
 from artsim.making.solids import Solid, box, cylinder, frame, hull, union
 from artsim.model.kinematics import Array
@@ -48,8 +48,7 @@ class _Bar:
 
 def build(rng: Rng) -> Assembly:
     """A folding chair, unfolded at rest; one sits down facing -X."""
-    kinds = (_crossed, _under, _tip_up, _stool)
-    return kinds[rng.choice(4, p=[0.45, 0.2, 0.2, 0.15])](rng)
+    return pick(rng, {_crossed: 0.45, _under: 0.2, _tip_up: 0.2, _stool: 0.15})(rng)
 
 
 def _bar(rng: Rng) -> _Bar:
@@ -63,7 +62,7 @@ def _panel(rng: Rng, low: Array, high: Array, axis: int) -> Solid:
 
     ``axis`` is the direction that slats follow one another in.
     """
-    kind = str(rng.choice(["board", "slats", "frame", "cushion"], p=[0.35, 0.3, 0.15, 0.2]))
+    kind = pick(rng, {"board": 0.35, "slats": 0.3, "frame": 0.15, "cushion": 0.2})
     thick = 2 if axis == 0 else 0
     if kind == "slats":
         count = int(np.clip((high[axis] - low[axis]) / rng.uniform(0.035, 0.09), 1, 9))
@@ -159,7 +158,7 @@ def _crossed(rng: Rng) -> Assembly:
     seat = _panel(rng, corners[0] + (hinge_at[0], 0, 0), corners[1] + (hinge_at[0], 0, 0), 0)
     steep = np.pi / 2 + (lean - bend)
     swing = steep - 0.08 - float(arctan2(0.5 * seat_thick + thick + 0.02, back_low))
-    how = str(rng.choice(["follows", "free", "fixed"], p=[0.4, 0.45, 0.15]))
+    how = pick(rng, {"follows": 0.4, "free": 0.45, "fixed": 0.15})
     if how == "fixed":
         swing = rng.uniform(0.1, 0.3)
     if how == "follows":
@@ -223,7 +222,7 @@ def _under(rng: Rng) -> Assembly:
 
 def _tip_up(rng: Rng) -> Assembly:
     """Seats that tip up between fixed sides, as in a hall; one or more in a row."""
-    count = int(rng.choice([1, 2, 3], p=[0.55, 0.3, 0.15]))
+    count = pick(rng, {1: 0.55, 2: 0.3, 3: 0.15})
     width, depth = rng.uniform(0.42, 0.56), rng.uniform(0.36, 0.48)
     side_thick = rng.uniform(0.02, 0.06)
     seat_z, thick = rng.uniform(0.38, 0.46), rng.uniform(0.03, 0.1)

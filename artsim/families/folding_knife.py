@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import cos, power, sin
-from artsim.making.assembly import Assembly, Rng, revolute
+from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.solids import Solid, box, cylinder, loft, prism, union
 from artsim.model.kinematics import Array
 
@@ -109,7 +109,7 @@ def _blade(rng: Rng, length: float, low: float, high: float, pin: float, kind: s
         back, edge = low * (1 - (1 - taper) * x), high * (1 - (1 - taper) * x)
         back[-1], edge[-1] = 0.8 * back[-1], 0.8 * edge[-1]
     else:
-        shape = str(rng.choice(["drop", "clip", "sheep", "spear"]))
+        shape = pick(rng, ["drop", "clip", "sheep", "spear"])
         bend, level, turn = {
             "drop": (2.2, 0.4, 0.5),
             "clip": (1.0, 0.45, rng.uniform(0.55, 0.7)),
@@ -139,7 +139,7 @@ def _details(rng: Rng, outline: Array, pins: Array, top: float) -> Solid:
     for face, outward in ((0.0, -1), (top, 1)):
         for px, py in pins:
             solid += cylinder((px, py, face - outward * 0.001), (px, py, face + outward * 0.0005), radius, sections=12)
-    kind = str(rng.choice(["none", "bolster", "badge", "clip"]))
+    kind = pick(rng, ["none", "bolster", "badge", "clip"])
     if kind == "bolster":
         shown = outline[:, outline[0, :, 0] < pins[0, 0] + rng.uniform(0.05, 0.2) * half] * 0.97
         solid += _plate(shown, top - 0.0008, top + 0.0006) + _plate(shown, -0.0006, 0.0008)

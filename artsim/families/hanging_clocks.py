@@ -7,7 +7,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.clock_faces import add_hands, dial_plate, glass_door, outline, pendulum, rim
 from artsim.families.details import side_hinge
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import FRONT
 from artsim.making.solids import box, cylinder, ellipsoid, frame, hull_of, prism, tube
 
@@ -19,7 +19,7 @@ def wall_clock(rng: Rng) -> Assembly:
     """A plain case, or a face with rays."""
     radius = rng.uniform(0.07, 0.25)
     deep = radius * rng.uniform(0.1, 0.5)
-    kind = str(rng.choice(["round", "round", "square", "octagon", "dodecagon", "hexagon", "rays"]))
+    kind = pick(rng, ["round", "round", "square", "octagon", "dodecagon", "hexagon", "rays"])
     tall = 1.0 if kind != "square" or rng.random() < 0.5 else rng.uniform(1.05, 1.5)
     edge = rng.uniform(1.04, 1.35)
     body = dial_plate(rng, radius)
@@ -55,7 +55,7 @@ def pendulum_clock(rng: Rng) -> Assembly:
     """A case on the wall with a box below, in which a pendulum hangs; or the pendulum hangs free."""
     radius = rng.uniform(0.06, 0.14)
     deep = rng.uniform(0.05, 0.11)
-    kind = str(rng.choice(["round", "octagon", "square", "house", "arch"]))
+    kind = pick(rng, ["round", "octagon", "square", "house", "arch"])
     half = radius * rng.uniform(1.1, 1.35)
     body = dial_plate(rng, radius)
     body += rim(rng, 1.005 * radius, 0.06 * radius, 0.003 + 0.1 * radius)

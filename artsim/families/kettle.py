@@ -15,7 +15,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.common.products import unit
 from artsim.families.vessels import Level, cross_section, dome, grip_loop, moulded
-from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute, screw
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute, screw
 from artsim.making.outlines import UP
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, ring, tube
 from artsim.model.kinematics import Array
@@ -40,10 +40,10 @@ class Pot:
 
 def build(rng: Rng) -> Assembly:
     """A kettle with its lid on at rest; it pours towards -X."""
-    kind = str(rng.choice(["stove", "electric", "teapot"], p=[0.38, 0.37, 0.25]))
+    kind = pick(rng, {"stove": 0.38, "electric": 0.37, "teapot": 0.25})
     standing = kind == "electric" and rng.random() < 0.6  # on a base of its own
     pot = _pot(rng, kind, 0.022 if standing else 0.0)
-    outline = cross_section(str(rng.choice(["round", "round", "round", "octagon", "square"])), rng.uniform(0.0, 0.4))
+    outline = cross_section(pick(rng, ["round", "round", "round", "octagon", "square"]), rng.uniform(0.0, 0.4))
     body = moulded(pot.levels, outline)
     spout, mouth = _spout(rng, kind, pot)
     body += spout
@@ -51,7 +51,7 @@ def build(rng: Rng) -> Assembly:
     swinging = bow and rng.random() < 0.6
     over = np.inf
     room = pot.top + pot.mouth * rng.uniform(1.1, 1.6)  # below the bow
-    lid_joint = str(rng.choice(["lift", "hinge", "turn", "screw"], p=[0.45, 0.3, 0.1, 0.15]))
+    lid_joint = pick(rng, {"lift": 0.45, "hinge": 0.3, "turn": 0.1, "screw": 0.15})
     if kind == "electric" and rng.random() < 0.6:
         lid_joint = "hinge"
     if bow and lid_joint == "hinge":
@@ -93,7 +93,7 @@ def _pot(rng: Rng, kind: str, foot: float) -> Pot:
     height = wide * rng.uniform(*share)
     shapes = {"stove": ["cone", "drum", "belly", "squat"], "electric": ["cone", "drum", "hourglass", "belly"],
               "teapot": ["belly", "ball", "squat", "drum", "pear"]}  # fmt: skip
-    shape = str(rng.choice(shapes[kind]))
+    shape = pick(rng, shapes[kind])
     mouth = rng.uniform(0.45, 0.75)
     if kind == "electric":
         mouth = rng.uniform(0.65, 0.9)
@@ -121,9 +121,9 @@ def _pot(rng: Rng, kind: str, foot: float) -> Pot:
 def _spout(rng: Rng, kind: str, pot: Pot) -> tuple[Solid, tuple[Array, Array, float] | None]:
     """Beak at the rim, or a tube from the belly; the mouth of a straight one: its middle, direction and radius."""
     height = pot.top - pot.foot
-    choice = str(rng.choice(["tube", "goose", "beak"], p=[0.55, 0.3, 0.15]))
+    choice = pick(rng, {"tube": 0.55, "goose": 0.3, "beak": 0.15})
     if kind == "electric":
-        choice = str(rng.choice(["beak", "goose", "tube"], p=[0.75, 0.15, 0.1]))
+        choice = pick(rng, {"beak": 0.75, "goose": 0.15, "tube": 0.1})
     shoulder = pot.radius(pot.top - 0.1 * height) < 0.75 * max(level[1] for level in pot.levels)
     if choice == "beak" and shoulder:  # a beak at a narrow rim would pour onto the body
         choice = "tube"
@@ -180,7 +180,7 @@ def _lid(rng: Rng, pot: Pot, joint: str, low: bool) -> tuple[Solid, float]:
     lid += dome(share * radius, z + rim - 0.0005, rise)
     top = z + rim + rise
     size = pot.mouth * rng.uniform(0.16, 0.28)
-    kind = str(rng.choice(["ball", "mushroom", "ring", "bar", "cone"]))
+    kind = pick(rng, ["ball", "mushroom", "ring", "bar", "cone"])
     foot = top - 0.15 * rise - 0.001
     if kind == "ball":
         lid += cylinder((0, 0, foot), (0, 0, top + 0.5 * size), 0.4 * size) + ellipsoid((0, 0, top + size), size, 14)
@@ -310,7 +310,7 @@ def _back_grip(rng: Rng, pot: Pot, hinged: bool, kind: str) -> Solid:
     low = pot.foot + height * rng.uniform(0.12, 0.4)
     reach = max(pot.radius(z) for z in (low, high)) + rng.uniform(0.03, 0.05)
     thick, wide = rng.uniform(0.004, 0.007), rng.uniform(0.006, 0.012)
-    style = str(rng.choice(["loop", "open", "round"]))
+    style = pick(rng, ["loop", "open", "round"])
     start, end = (0.8 * pot.radius(high), high), (0.8 * pot.radius(low), low)
     if style == "loop":
         points = [start, (0.92 * reach, high + 0.05 * height), (reach, high - 0.15 * height),

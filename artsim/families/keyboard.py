@@ -25,7 +25,7 @@ from artsim.families.key_layouts import (
     number_layout,
 )
 from artsim.families.keys import CLEAR, Face, key, key_outline, press, top_face
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, hull, tube, union
 from artsim.model.kinematics import Array
@@ -48,8 +48,8 @@ class _Caps:
 
 def build(rng: Rng) -> Assembly:
     """A keyboard; no key is pressed and the feet are folded in at rest."""
-    kinds = ["full", "compact", "numbers", "macro", "pivot", "folding", "angled"]
-    kind = str(rng.choice(kinds, p=[0.2, 0.2, 0.16, 0.16, 0.1, 0.08, 0.1]))
+    kinds = {"full": 0.2, "compact": 0.2, "numbers": 0.16, "macro": 0.16, "pivot": 0.1, "folding": 0.08, "angled": 0.1}
+    kind = pick(rng, kinds)
     caps = _draw_caps(rng)
     keyboard = Assembly(density=900.0)
     if kind in ("pivot", "folding", "angled"):
@@ -93,7 +93,7 @@ def _draw_caps(rng: Rng) -> _Caps:
     height = pitch * (rng.uniform(0.35, 0.65) if tall else rng.uniform(0.1, 0.25))
     travel = height * rng.uniform(0.2, 0.45)
     shrink = rng.uniform(0.15, 0.4) if tall else rng.uniform(0.0, 0.15)
-    kind = str(rng.choice(["square", "pill", "round"], p=[0.66, 0.24, 0.1]))
+    kind = pick(rng, {"square": 0.66, "pill": 0.24, "round": 0.1})
     step = height * rng.uniform(0.0, 0.18) if tall else 0.0
     return _Caps(pitch, height, travel, shrink, rng.uniform(0.76, 0.95), kind, step)
 

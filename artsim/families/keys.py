@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from artsim.common.elementary import cos, sin
-from artsim.making.assembly import Assembly, JointSpec, Rng, prismatic
+from artsim.making.assembly import Assembly, JointSpec, Rng, pick, prismatic
 from artsim.making.outlines import Vector, lifted, rounded_rectangle
 from artsim.making.solids import Solid, hull, prism, union
 from artsim.model.kinematics import Array
@@ -113,7 +113,7 @@ def add_keypad(
     height: float, first: int = 0,
 ) -> int:  # fmt: skip
     """Keys in three or four columns over a part of a face, function keys above them; returns the next free number."""
-    kind = str(rng.choice(["square", "pill", "round"]))
+    kind = pick(rng, ["square", "pill", "round"])
     columns, rows = (3, 4) if rng.random() < 0.7 else (int(rng.integers(3, 6)), int(rng.integers(2, 5)))
     fill = rng.uniform(0.6, 0.9, 2)
     travel = min(rng.uniform(0.0003, 0.0006), height - 0.0008)
@@ -136,8 +136,8 @@ def add_function_keys(
     """Two keys with a larger one between them; returns the next free number."""
     travel, deep, middle = 0.0003, v[1] - v[0], 0.5 * (v[0] + v[1])
     wide = 0.5 * half
-    big = key_outline(str(rng.choice(["round", "pill", "square"])), (min(0.8 * half, 1.4 * deep), 0.85 * deep), 14)
-    small = key_outline(str(rng.choice(["round", "pill", "square"])), (0.8 * wide, 0.5 * deep), 10)
+    big = key_outline(pick(rng, ["round", "pill", "square"]), (min(0.8 * half, 1.4 * deep), 0.85 * deep), 14)
+    small = key_outline(pick(rng, ["round", "pill", "square"]), (0.8 * wide, 0.5 * deep), 10)
     for u, outline in ((-0.75 * half, small), (0.0, big), (0.75 * half, small)):
         add_key(phone, parent, f"button_{number}", face, (u, middle), outline, height, travel, 0.15)
         number += 1

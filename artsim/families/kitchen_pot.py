@@ -11,7 +11,7 @@ import numpy as np
 from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import bow_handle, knob
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, Rng, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, ring, tube, union, vessel
 from artsim.model.kinematics import Array
 
@@ -22,7 +22,7 @@ STEEL = 2500.0  # kg/m^3, as walls are thicker than real ones
 def build(rng: Rng) -> Assembly:
     """A pot with its lid on at rest; it faces -X."""
     radius = with_tails(rng, (0.08, 0.16), (0.06, 0.24), 0.2)
-    shape = str(rng.choice(["straight", "flared", "bellied", "round"], p=[0.4, 0.2, 0.2, 0.2]))
+    shape = pick(rng, {"straight": 0.4, "flared": 0.2, "bellied": 0.2, "round": 0.2})
     height = radius * (rng.uniform(0.3, 0.9) if rng.random() < 0.4 else with_tails(rng, (0.9, 2.1), (0.9, 3.0), 0.15))
     wall = rng.uniform(0.003, 0.006)
     profile = _profile(rng, shape, radius, height)
@@ -86,7 +86,7 @@ def _handles(rng: Rng, radius: float, height: float, hinged: bool) -> Solid:
         if rng.random() < 0.3:
             solid += _short(rng, "bow", radius, z).turned((0, 0, 1), np.pi)
         return solid.turned((0, 0, 1), rng.choice([0.0, -0.5 * np.pi]))
-    kind = str(rng.choice(["bow", "ear", "bar"], p=[0.45, 0.25, 0.3]))
+    kind = pick(rng, {"bow": 0.45, "ear": 0.25, "bar": 0.3})
     one = _short(rng, kind, radius, z).turned((0, 0, 1), 0.5 * np.pi)
     return one + one.mirrored(1)
 
@@ -142,7 +142,7 @@ def _lid(rng: Rng, radius: float, height: float, wall: float, mouth: float, hing
         solid += ring((0, 0, z - 0.003), (0, 0, 1), inner - 0.004, inner, 0.008, 24)
     top = low + dome
     foot = np.array([0.0, 0.0, top])
-    kind = rng.choice(["knob", "bow", "disc", "bridge"], p=[0.4, 0.25, 0.2, 0.15])
+    kind = pick(rng, {"knob": 0.4, "bow": 0.25, "disc": 0.2, "bridge": 0.15})
     size = radius * rng.uniform(0.1, 0.25)
     if kind == "knob":
         solid += knob(foot, np.array([0.0, 0.0, 1.0]), 0.9 * size, size)

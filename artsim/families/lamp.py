@@ -15,7 +15,7 @@ from artsim.common.elementary import arcsin, arctan2, cos, sin
 from artsim.common.products import apply
 from artsim.families.clearance import Link, narrow_limits
 from artsim.families.standing_lamp import spotlight, standing
-from artsim.making.assembly import Assembly, Rng, continuous, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, pick, revolute
 from artsim.making.outlines import SIDE, UP, rotation_about
 from artsim.making.solids import box, cylinder, ellipsoid, hull_of, revolved, tube, union
 from artsim.model.kinematics import Array
@@ -25,7 +25,7 @@ GAP = 0.001
 
 def build(rng: Rng) -> Assembly:
     """A lamp; what leans, leans forward to -X at rest."""
-    return (_desk, standing, spotlight)[rng.choice(3, p=[0.5, 0.32, 0.18])](rng)
+    return pick(rng, {_desk: 0.5, standing: 0.32, spotlight: 0.18})(rng)
 
 
 def _desk(rng: Rng) -> Assembly:
@@ -95,7 +95,7 @@ def _lean(angle: float) -> Array:
 def _base(rng: Rng, link: Link, r: float) -> float:
     """The foot; returns the height of its top."""
     wide, thick = rng.uniform(0.06, 0.1), rng.uniform(0.012, 0.03)
-    kind = rng.choice(["disc", "dome", "square", "clamp"], p=[0.4, 0.2, 0.25, 0.15])
+    kind = pick(rng, {"disc": 0.4, "dome": 0.2, "square": 0.25, "clamp": 0.15})
     if kind == "clamp":
         link.solid += box((-0.06, 0.035), 0.025, 0.012, fillet=0.004)
         link.solid += box((0.02, 0.035), 0.025, (-0.09, 0.0)) + box((-0.04, 0.03), 0.02, (-0.09, -0.078))
@@ -147,7 +147,7 @@ def _arm(
 def _shade(rng: Rng, links: list[Link], at: Array, side: float, arm_angle: float, half: float, r: float) -> None:
     """The last link: knuckle, stem and shade. It turns as far as its rim keeps clear of the arm."""
     stem = rng.uniform(0.04, 0.06)
-    kind = str(rng.choice(["cone", "bell", "panel"], p=[0.45, 0.3, 0.25]))
+    kind = pick(rng, {"cone": 0.45, "bell": 0.3, "panel": 0.25})
     if kind == "panel":
         length, wide, deep = rng.uniform(0.16, 0.3), rng.uniform(0.016, 0.035), 0.012
         outline = np.array([(0.6 * length, -0.003)])

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.common.elementary import tan
-from artsim.making.assembly import Assembly, Rng, revolute
+from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull_of, posts
 
 GAP = 0.0008
@@ -82,7 +82,7 @@ def _shape(rng: Rng) -> _Shape:
 def _shell(rng: Rng, low: tuple[float, ...], high: tuple[float, ...], corner: float, side: int) -> Solid:
     """Plate whose upper (side 1) or lower (-1) edges are bevelled or, seen from the side, wedge-shaped."""
     plate = box(low, high, fillet=corner, axis=2)
-    kind = rng.choice(["plain", "bevel", "wedge"], p=[0.45, 0.4, 0.15])
+    kind = pick(rng, {"plain": 0.45, "bevel": 0.4, "wedge": 0.15})
     if kind == "plain":
         return plate
     z0, z1 = low[2], high[2]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import arctan2, cos, sin
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import about, lifted, superellipse
 from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, ring, tube, union
 from artsim.model.kinematics import Array
@@ -19,8 +19,7 @@ GAP = 0.0005
 
 def build(rng: Rng) -> Assembly:
     """A lighter that stands upright; what one presses or opens is towards -X at its top."""
-    kinds = (_pocket, _disposable, _long, _table)
-    return kinds[rng.choice(4, p=[0.36, 0.3, 0.22, 0.12])](rng)
+    return pick(rng, {_pocket: 0.36, _disposable: 0.3, _long: 0.22, _table: 0.12})(rng)
 
 
 def _spark_wheel(center: Array, radius: float, half: float, notched: bool) -> Solid:

@@ -11,7 +11,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import turns
 from artsim.making.solids import Solid, box, cylinder, posts, tray, union
 from artsim.model.kinematics import Array
@@ -51,7 +51,7 @@ def build(rng: Rng) -> Assembly:
         body += box(panel_low, panel_high + (0.01, 0, 0), fillet=0.004, axis=1)
     opener = bool(has_panel and not drops and rng.random() < 0.35)
     controls, movers = _controls(rng, panel_low, panel_high, opener) if has_panel else (Solid(), [])
-    handle = "none" if opener else str(rng.choice(["bar", "bow", "flat", "none"]))
+    handle = "none" if opener else pick(rng, ["bar", "bow", "flat", "none"])
     oven.record(handles=handle != "none")
     door = _door(rng, low, high, drops, handle)
 

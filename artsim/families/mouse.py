@@ -14,7 +14,7 @@ from artsim.common.elementary import cos, sin
 from artsim.common.products import apply
 from artsim.families.details import holed_plate
 from artsim.families.keys import Face, key, key_outline, press, top_face
-from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, revolute
 from artsim.making.outlines import rotation_about
 from artsim.making.solids import Solid, cylinder, ellipsoid, hull, loft, tube, union
 from artsim.model.kinematics import Array
@@ -130,7 +130,7 @@ def _roll(rng: Rng) -> Array | None:
     """(3, 3) roll of an upright mouse; None for the usual ones."""
     if rng.random() < 0.86:
         return None
-    return rotation_about((1.0, 0.0, 0.0), float(rng.choice([-1.0, 1.0], p=[0.85, 0.15])) * rng.uniform(0.25, 0.85))
+    return rotation_about((1.0, 0.0, 0.0), pick(rng, {-1.0: 0.85, 1.0: 0.15}) * rng.uniform(0.25, 0.85))
 
 
 def _draw_dome(rng: Rng) -> _Dome:
@@ -160,7 +160,7 @@ def _shell(rng: Rng, parts: _Parts, dome: _Dome) -> None:
     length = back - front
     split = front + rng.uniform(0.33, 0.62) * length
     floor = rng.uniform(0.3, 0.55)
-    count = int(rng.choice([1, 2, 3], p=[0.15, 0.65, 0.2]))
+    count = pick(rng, {1: 0.15, 2: 0.65, 3: 0.2})
     height = dome.at(split)[0]
     # The gap below the buttons, in shares of the height, leaves room for their travel.
     room = (0.0022 + GAP) / float(dome.heights[dome.stations <= split].min())

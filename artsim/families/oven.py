@@ -13,7 +13,7 @@ import numpy as np
 from artsim.common.elementary import arctan2
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel, wire_shelf
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, posts, tray, union
 from artsim.model.kinematics import Array
 
@@ -62,7 +62,7 @@ def build(rng: Rng) -> Assembly:
     oven.add("body", body, density=350.0)
 
     sideways = bool(not two and rng.random() < 0.1)
-    kind, reach = str(rng.choice(["bar", "bow", "flat"])), rng.uniform(0.035, 0.055)
+    kind, reach = pick(rng, ["bar", "bow", "flat"]), rng.uniform(0.035, 0.055)
     for number, (low, high) in enumerate(pairwise(edges), 1):
         corner_low = np.array([-thick, 0.001 - half, low + GAP])
         # The upper back edge of a door that drops rises before it falls.
@@ -119,7 +119,7 @@ def _hob(rng: Rng, half: float, depth: float, z: float, thick: float, rise: floa
     solid = box((-thick - over, depth), half + over, (z - 0.001, top), fillet=0.004)
     columns = 3 if half > 0.34 else 2 if half > 0.22 else 1
     ys = (np.arange(columns) - 0.5 * (columns - 1)) * (1.9 * half / columns)
-    kind = str(rng.choice(["gas", "coil", "glass"], p=[0.5, 0.25, 0.25]))
+    kind = pick(rng, {"gas": 0.5, "coil": 0.25, "glass": 0.25})
     if kind == "glass":
         solid += box((-thick + 0.02, depth - 0.07), half - 0.02, (top - 0.001, top + 0.003), fillet=0.01, axis=2)
     for x in np.array([0.24, 0.68]) * depth:

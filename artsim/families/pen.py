@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute, screw
+from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute, screw
 from artsim.making.outlines import UP
 from artsim.making.solids import Solid, box, hull, loft, union
 from artsim.model.kinematics import Array
@@ -53,9 +53,9 @@ def build(rng: Rng) -> Assembly:
     length = rng.uniform(0.08, 0.2)
     slim = rng.random() < 0.3
     radius = length * (rng.uniform(0.02, 0.045) if slim else rng.uniform(0.045, 0.14))
-    kind = str(rng.choice(["cap", "button", "twist", "sliders", "two caps"], p=[0.42, 0.27, 0.13, 0.09, 0.09]))
+    kind = pick(rng, {"cap": 0.42, "button": 0.27, "twist": 0.13, "sliders": 0.09, "two caps": 0.09})
     turning = kind == "twist" or (kind == "cap" and rng.random() < 0.3)
-    sides = int(rng.choice([_ROUND, 3, 4, 6, 8], p=[0.5, 0.1, 0.12, 0.18, 0.1]))
+    sides = pick(rng, {_ROUND: 0.5, 3: 0.1, 4: 0.12, 6: 0.18, 8: 0.1})
     flat = 1.0 if rng.random() < 0.6 else rng.uniform(0.4, 1.0)
     # What turns about the barrel's axis is round, or it would run into its neighbour.
     section = _Section(_ROUND, 1.0) if turning else _Section(sides, flat)
@@ -82,7 +82,7 @@ def _barrel(rng: Rng, low: float, high: float, first: float, last: float) -> Arr
 
 def _tip(rng: Rng, section: _Section, radius: float, length: float) -> Solid:
     """What writes, from z = 0 up to where its neck is ``radius`` wide: a cone, a nib, a felt block or a ball."""
-    kind = str(rng.choice(["cone", "nib", "felt", "stub"], p=[0.45, 0.15, 0.2, 0.2]))
+    kind = pick(rng, {"cone": 0.45, "nib": 0.15, "felt": 0.2, "stub": 0.2})
     if kind == "nib":
         flat = [(-0.0004, -0.6 * radius, length), (-0.0004, 0.6 * radius, length), (-0.0004, 0.0, 0.0)]
         nib = hull([*flat, *((0.0004, y, z) for _, y, z in flat)])

@@ -14,22 +14,21 @@ import numpy as np
 from artsim.common.elementary import exp
 from artsim.families.desk_phone import desk_set
 from artsim.families.keys import Face, add_function_keys, add_key, add_keypad, cross_sections, front_face, key_outline
-from artsim.making.assembly import Assembly, Rng, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
 from artsim.making.outlines import about, lifted
 from artsim.making.solids import Solid, box, cylinder, hull, loft, union
 
 GAP = 0.0005
 UNDER_LID = (0.001, 0.0016)
 """How far keys under a lid stand out, metres."""
-KINDS = ("bar", "flip", "slider", "swivel", "fold", "smartphone", "cordless", "desk")
 
 
 def build(rng: Rng) -> Assembly:
     """A telephone; closed, its handset in place and no key pressed at rest."""
-    kind = str(rng.choice(KINDS, p=[0.15, 0.17, 0.12, 0.07, 0.08, 0.1, 0.11, 0.2]))
+    kinds = {_bar: 0.15, _flip: 0.17, _slider: 0.12, _swivel: 0.07, _fold: 0.08, _smartphone: 0.1, _cordless: 0.11,
+             desk_set: 0.2}  # fmt: skip
     phone = Assembly(density=1300.0)
-    makers = (_bar, _flip, _slider, _swivel, _fold, _smartphone, _cordless, desk_set)
-    makers[KINDS.index(kind)](rng, phone)
+    pick(rng, kinds)(rng, phone)
     return phone
 
 

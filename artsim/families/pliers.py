@@ -10,7 +10,7 @@ import numpy as np
 
 from artsim.common.elementary import power, sin
 from artsim.common.products import norm
-from artsim.making.assembly import Assembly, Rng, revolute
+from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, loft, prism, union
 from artsim.model.kinematics import Array
 
@@ -20,7 +20,7 @@ GAP = 0.0006
 def build(rng: Rng) -> Assembly:
     """Pliers, closed at rest. One lever turns about the vertical rivet."""
     length = rng.uniform(0.09, 0.38)
-    kind = str(rng.choice(["combination", "nose", "flat", "cutting", "hollow"]))
+    kind = pick(rng, ["combination", "nose", "flat", "cutting", "hollow"])
     jaw = length * {"nose": 0.36, "cutting": 0.13, "flat": 0.26}.get(kind, 0.22) * rng.uniform(0.75, 1.3)
     thick = length * rng.uniform(0.035, 0.11)
     disc = length * rng.uniform(0.05, 0.075)

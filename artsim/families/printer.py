@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.families.keys import add_key, front_face, key_cells, key_outline, top_face
-from artsim.making.assembly import Assembly, Rng, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
 from artsim.making.outlines import FRONT, about, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, hull, posts, prism, tray, union
 from artsim.model.kinematics import Array
@@ -53,7 +53,7 @@ class _Band:
 
 def build(rng: Rng) -> Assembly:
     """A printer; drawers, lids and flaps are shut and no key is pressed at rest."""
-    kind = str(rng.choice(["inkjet", "laser", "copier", "small"], p=[0.4, 0.24, 0.18, 0.18]))
+    kind = pick(rng, {"inkjet": 0.4, "laser": 0.24, "copier": 0.18, "small": 0.18})
     size = {
         "inkjet": ((0.14, 0.17), (0.26, 0.28)),
         "laser": ((0.15, 0.16), (0.26, 0.28)),
@@ -100,10 +100,10 @@ def _bands(rng: Rng, kind: str, size: float) -> list[_Band]:
     output = size * rng.uniform(0.3, 0.7)
     kinds = {"inkjet": ["flap", "sliding tray", "niche"], "laser": ["flap", "solid", "flap"],
              "copier": ["niche", "flap", "solid"], "small": ["slit", "flap", "sliding tray"]}[kind]  # fmt: skip
-    bands.append(_Band(str(rng.choice(kinds)), output))
+    bands.append(_Band(pick(rng, kinds), output))
     if kind == "laser" and rng.random() < 0.5:
         bands.append(_Band("flap", size * rng.uniform(0.3, 0.8)))
-    panel = str(rng.choice(["panel", "tilting panel", "solid"], p=[0.45, 0.35, 0.2]))
+    panel = pick(rng, {"panel": 0.45, "tilting panel": 0.35, "solid": 0.2})
     bands.append(_Band(panel, size * rng.uniform(0.2, 0.5)))
     return bands
 
@@ -189,7 +189,7 @@ def _keys(rng: Rng, printer: Assembly, parent: str, front: float, half: float, l
     pitch = min(0.85 * rise / rows, 0.03)
     columns = int(rng.integers(1, 6))
     travel = rng.uniform(0.0008, 0.0015)
-    outline = key_outline(str(rng.choice(["round", "square", "pill"])), (0.68 * pitch, 0.6 * pitch), 10)
+    outline = key_outline(pick(rng, ["round", "square", "pill"]), (0.68 * pitch, 0.6 * pitch), 10)
     sides = [-1.0, 1.0] if rng.random() < 0.3 else [float(rng.choice([-1.0, 1.0]))]
     columns = min(columns, int(0.6 * half / pitch), 12 // (rows * len(sides)))
     number = 0
@@ -270,7 +270,7 @@ def _top_keys(rng: Rng, printer: Assembly, case: _Case, top: float, back: float)
     pitch = min(0.6 * room, 0.03)
     columns = min(int(rng.integers(2, 8)), int(1.2 * case.y / pitch))
     travel = rng.uniform(0.0008, 0.0015)
-    outline = key_outline(str(rng.choice(["round", "square", "pill"])), (0.7 * pitch, 0.6 * pitch), 10)
+    outline = key_outline(pick(rng, ["round", "square", "pill"]), (0.7 * pitch, 0.6 * pitch), 10)
     face = top_face(top, -case.x + 0.5 * room, 0.0)
     middle = rng.uniform(-0.3, 0.3) * case.y
     for _, column, u, v in key_cells(

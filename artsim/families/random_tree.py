@@ -16,7 +16,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, exp, log
 from artsim.common.products import apply, matmul, norm, unit
-from artsim.making.assembly import Assembly, JointSpec, Rng
+from artsim.making.assembly import Assembly, JointSpec, Rng, pick
 from artsim.making.outlines import rotation_about
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, ring, tube, union
 from artsim.model.kinematics import Array
@@ -28,7 +28,7 @@ _DEEPEST_DIP = 0.02  # metres by which a branch on a hinge may swing below the f
 _BELOW = np.array([[-9.0, -9.0, -9.0], [9.0, 9.0, -GAP]])
 """Where nothing may hang on a part: towards its own parent."""
 SHAPES = ("box", "rounded", "cylinder", "cone", "ball", "frame", "ring", "bar", "cross", "wedge")
-JOINTS = ("revolute", "continuous", "prismatic", "screw")
+JOINTS = {"revolute": 0.25, "continuous": 0.3, "prismatic": 0.28, "screw": 0.17}
 
 
 @dataclass
@@ -129,7 +129,7 @@ def _grow(rng: Rng, k: int, parents: list[int], scale: float) -> _Branch:
 
 def _shape(rng: Rng, size: Array) -> Solid:
     """A simple solid about the origin with roughly the given sides."""
-    kind = str(rng.choice(SHAPES))
+    kind = pick(rng, SHAPES)
     half = 0.5 * size
     x, y, z = half
     thin = 0.22 * float(size.min())
@@ -173,7 +173,7 @@ def _motion(rng: Rng, branch: _Branch, siblings: list[_Motion]) -> _Motion:
         leader, multiplier = siblings[source], float(rng.choice([-1.0, 0.5, 1.0]))
         lower, upper = sorted((multiplier * leader.lower, multiplier * leader.upper))
         return _Motion(leader.type, axis, origin, lower, upper, 0.0, source, multiplier)
-    kind = str(rng.choice(JOINTS, p=[0.25, 0.3, 0.28, 0.17]))
+    kind = pick(rng, JOINTS)
     if rng.random() < 0.15:  # oblique
         axis = unit(axis + rng.normal(0.0, 0.2, 3))
     if kind == "prismatic":

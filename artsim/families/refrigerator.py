@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.families.details import front_handle, rounded_shell, side_hinge
-from artsim.making.assembly import Assembly, Rng, prismatic
+from artsim.making.assembly import Assembly, Rng, pick, prismatic
 from artsim.making.outlines import about
 from artsim.making.solids import Solid, box, frame, posts, tray, union
 from artsim.model.kinematics import Array
@@ -36,7 +36,7 @@ class Style:
 
 def build(rng: Rng) -> Assembly:
     """A refrigerator, closed at rest. The back of its doors is the plane x = 0."""
-    layout = str(rng.choice(["single", "stacked", "beside", "french"], p=[0.38, 0.27, 0.17, 0.18]))
+    layout = pick(rng, {"single": 0.38, "stacked": 0.27, "beside": 0.17, "french": 0.18})
     small = layout == "single" and rng.random() < 0.65
     width = rng.uniform(0.78, 0.95) if layout in ("beside", "french") else rng.uniform(0.45, 0.72)
     width = min(width, 0.6) if small else width
@@ -48,7 +48,7 @@ def build(rng: Rng) -> Assembly:
         corner=rng.choice([0.003, rng.uniform(0.005, 0.025)]),
         wall=rng.uniform(0.035, 0.06),
         bins=rng.uniform(0.06, 0.1) if rng.random() < 0.7 else 0.0,
-        handle=str(rng.choice(["bar", "bow", "flat", "none"], p=[0.35, 0.25, 0.2, 0.2])),
+        handle=pick(rng, {"bar": 0.35, "bow": 0.25, "flat": 0.2, "none": 0.2}),
         level=bool(rng.random() < 0.2),
         reach=rng.uniform(0.035, 0.06),
         radius=rng.uniform(0.007, 0.013),

@@ -14,7 +14,7 @@ import numpy as np
 from artsim.common.elementary import exp, sin
 from artsim.families.details import dial
 from artsim.families.keys import Face, add_key, cross_sections, front_face, key, key_cells, key_outline
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.solids import Solid, box, cylinder, loft, ring
 from artsim.model.kinematics import Array
 
@@ -69,7 +69,7 @@ def _draw_body(rng: Rng) -> _Body:
     low, high = rng.uniform(0.06, 0.3), rng.uniform(0.9, 0.96)
     share = np.unique([*np.linspace(0.0, 1.0, 8), low, high])  # the face between low and high is flat
     levels = length * share
-    kind = str(rng.choice(["straight", "tapered", "waisted", "oval"], p=[0.34, 0.24, 0.24, 0.18]))
+    kind = pick(rng, {"straight": 0.34, "tapered": 0.24, "waisted": 0.24, "oval": 0.18})
     amount = rng.uniform(0.12, 0.5)
     if kind == "tapered":
         widths = 1.0 - amount * (share if rng.random() < 0.5 else 1.0 - share)
@@ -82,7 +82,7 @@ def _draw_body(rng: Rng) -> _Body:
     round_end = rng.uniform(0.0, 0.6) if kind != "oval" else 0.0
     widths = widths * np.where((levels == 0) | (levels == length), 1.0 - round_end, 1.0)
     # Ends of the front bend back or forward beyond the keys; the back has humps.
-    bends = rng.uniform(-0.1, 0.3, 2) * length * rng.choice([0.0, 1.0], p=[0.35, 0.65])
+    bends = rng.uniform(-0.1, 0.3, 2) * length * pick(rng, {0.0: 0.35, 1.0: 0.65})
     below, above = np.clip((low - share) / low, 0.0, 1.0), np.clip((share - high) / (1 - high), 0.0, 1.0)
     fronts = bends[0] * low * 2.0 * np.square(below) + 0.15 * bends[1] * np.square(above)
     hump, spot = rng.uniform(0.0, 1.2) * rng.choice([0.0, 1.0]), rng.uniform(0.1, 0.9)
@@ -138,7 +138,7 @@ def _keys(rng: Rng, remote: Assembly, body: _Body) -> float:
     face, half = front_face(0.0), body.key_half
     height, travel = rng.uniform(0.0009, 0.0035), rng.uniform(0.0003, 0.0008)
     pitch = min(max(half * rng.uniform(0.45, 0.8), 0.0055), 0.02)
-    kind = str(rng.choice(["square", "pill", "round", "diamond"], p=[0.3, 0.35, 0.3, 0.05]))
+    kind = pick(rng, {"square": 0.3, "pill": 0.35, "round": 0.3, "diamond": 0.05})
     fill, shrink = rng.uniform(0.55, 0.85), rng.uniform(0.0, 0.35)
     bands = _plan(rng, half, body.key_high - body.key_low, pitch)
     spare = body.key_high - body.key_low - sum(deep for _, _, _, deep in bands)

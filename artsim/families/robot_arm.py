@@ -10,7 +10,7 @@ import numpy as np
 
 from artsim.common.products import apply, matmul
 from artsim.families.clearance import Link, narrow_limits
-from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import rotation_about, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, hull, hull_of, ring
 from artsim.model.kinematics import Array
@@ -135,9 +135,9 @@ def build(rng: Rng) -> Assembly:
         reach = rng.uniform(0.4, 1.6)
         chain = _Chain(rng, reach * rng.uniform(0.055, 0.085))
         if rng.random() < 0.17:
-            _scara(chain, reach, str(rng.choice(SCARAS)))
+            _scara(chain, reach, pick(rng, SCARAS))
         else:
-            _arm(chain, reach, str(rng.choice(ARMS)))
+            _arm(chain, reach, pick(rng, ARMS))
         spread = _tool(chain)
         if narrow_limits(chain.links, 0.025 * reach):
             break
@@ -281,7 +281,7 @@ def _quill(chain: _Chain, height: float) -> None:
 
 def _tool(chain: _Chain) -> float | None:
     """What the last link carries; for a gripper, half its width in metres."""
-    kind = chain.rng.choice(["gripper", "suction", "probe", "flange"], p=[0.55, 0.15, 0.15, 0.15])
+    kind = pick(chain.rng, {"gripper": 0.55, "suction": 0.15, "probe": 0.15, "flange": 0.15})
     r, d, link = chain.radius, chain.along, chain.link
     end = chain.at
     if kind == "flange":

@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import front_handle, rounded_shell, side_hinge
-from artsim.making.assembly import Assembly, Rng, continuous, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, pick, revolute
 from artsim.making.outlines import about, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, posts, ring, tube, union
 from artsim.model.kinematics import Array
@@ -54,7 +54,7 @@ class Shape:
 
 def build(rng: Rng) -> Assembly:
     """A safe, closed at rest."""
-    kind = str(rng.choice(["small", "cube", "tall"], p=[0.35, 0.35, 0.3]))
+    kind = pick(rng, {"small": 0.35, "cube": 0.35, "tall": 0.3})
     width = {"small": (0.3, 0.45), "cube": (0.35, 0.6), "tall": (0.45, 0.75)}[kind]
     half = 0.5 * rng.uniform(*width)
     height = 2 * half * rng.uniform(*{"small": (0.55, 0.85), "cube": (0.9, 1.35), "tall": (1.5, 2.2)}[kind])
@@ -82,7 +82,7 @@ def build(rng: Rng) -> Assembly:
     x, y = shape.hinge
     upper = np.deg2rad(rng.uniform(100.0, 176.0))
     face = shape.door[0][0]
-    opener = str(rng.choice(["lever", "wheel", "pull"], p=[0.45, 0.3, 0.25]))
+    opener = pick(rng, {"lever": 0.45, "wheel": 0.3, "pull": 0.25})
     combination = bool(rng.random() < 0.6)
     door = _door(rng, shape, combination, opener)
     safe.add("door", placed(door), side_hinge(x, sign * y, upper, left))
@@ -185,7 +185,7 @@ def _door(rng: Rng, s: Shape, combination: bool, opener: str) -> Solid:
     if opener == "pull":
         y, z = low[1] + 0.16 * wide, 0.5 * (low[2] + high[2])
         start, end = (low[0], y, z - 0.18 * tall), (low[0], y, z + 0.18 * tall)
-        solid += front_handle(str(rng.choice(["bar", "bow", "flat"])), start, end, 0.035, 0.007)
+        solid += front_handle(pick(rng, ["bar", "bow", "flat"]), start, end, 0.035, 0.007)
     return solid
 
 

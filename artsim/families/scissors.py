@@ -15,7 +15,7 @@ import numpy as np
 
 from artsim.common.elementary import arcsin, arctan2, cos, hypot, sin
 from artsim.common.products import dot, matmul, norm
-from artsim.making.assembly import Assembly, Rng, revolute
+from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.solids import Solid, cylinder, ellipsoid, hull, hull_of, loft, prism, tube, union
 from artsim.model.kinematics import Array
 
@@ -44,7 +44,7 @@ def build(rng: Rng) -> Assembly:
     bar = length * (rng.uniform(0.026, 0.046) if plastic else rng.uniform(0.014, 0.024))
     height = bar * rng.uniform(0.8, 1.3) if plastic else max(bar, 2.6 * sheet)
     reach = length - blade
-    kind = str(rng.choice(["same", "long", "offset"], p=[0.4, 0.4, 0.2]))
+    kind = pick(rng, {"same": 0.4, "long": 0.4, "offset": 0.2})
     rings = [_ring(rng, reach, bar, kind, k, plastic) for k in range(2)]
     if kind == "same":
         rings[1] = rings[0]
@@ -82,7 +82,7 @@ def build(rng: Rng) -> Assembly:
 def _blade(rng: Rng, length: float, width: float) -> tuple[Array, ...]:
     """Convex outlines of the blade whose handle is at +Y: the edge just beyond the middle, the back at -Y."""
     edge, back = 0.2 * width, -0.8 * width
-    kind = str(rng.choice(["straight", "bellied", "blunt", "narrow"]))
+    kind = pick(rng, ["straight", "bellied", "blunt", "narrow"])
     tip = {"blunt": 0.55, "narrow": 0.05}.get(kind, 0.14) * width
     turn = rng.uniform(0.3, 0.6) if kind != "blunt" else rng.uniform(0.75, 0.9)
     sag = {"bellied": 0.7, "straight": 0.2, "narrow": 0.0}.get(kind, 0.5)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from artsim.families.wheels import STEEL, Wheels, bar
-from artsim.making.assembly import Assembly, Rng, revolute
+from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, tube, union
 from artsim.model.kinematics import Array
 
@@ -79,7 +79,7 @@ def shopping_cart(rng: Rng) -> Assembly:
     body += union(bar((0.5 * length - 0.02, s * half, high), (reach, s * half, grip), tubes) for s in (-1.0, 1.0))
     body += cylinder((reach, -half - 0.02, grip), (reach, half + 0.02, grip), 1.3 * tubes, sections=14)
     spots = [(front, -track * narrow), (front, track * narrow), (back, -track), (back, track)]
-    swivels = int(rng.choice([2, 4], p=[0.6, 0.4]))
+    swivels = pick(rng, {2: 0.6, 4: 0.4})
     body += union(wheels.bracket(x, y, base - 0.5 * tubes) for x, y in spots[swivels:])
     seat = rng.random() < 0.5
     seat_x, hinge_z = 0.5 * length - 0.05 - 0.3 * lean, high - 0.03

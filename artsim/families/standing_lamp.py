@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import cos, hypot, power, sin
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute, swivel
+from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute, swivel
 from artsim.making.outlines import SIDE, UP
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union, vessel
 
@@ -21,7 +21,7 @@ def standing(rng: Rng) -> Assembly:
     height = rng.uniform(0.22, 0.6) if rng.random() < 0.55 else rng.uniform(0.9, 1.7)
     radius = rng.uniform(0.006, 0.014) * (1.0 if height < 0.7 else 1.4)
     wide = rng.uniform(0.06, 0.12) * (1.0 if height < 0.7 else 1.5)
-    foot = str(rng.choice(["disc", "square", "legs", "vase"], p=[0.35, 0.2, 0.25, 0.2]))
+    foot = pick(rng, {"disc": 0.35, "square": 0.2, "legs": 0.25, "vase": 0.2})
     thick = rng.uniform(0.012, 0.03)
     base, floor = _foot(rng, foot, wide, thick, height, radius)
     slides = foot in ("disc", "square") and rng.random() < 0.35
@@ -41,7 +41,7 @@ def standing(rng: Rng) -> Assembly:
         parent = "pole"
     rim = rng.uniform(0.08, 0.19) * (1.0 if height < 0.7 else 1.4)
     tall = rim * rng.uniform(0.8, 1.9)
-    kind = str(rng.choice(["cone", "drum", "square", "ball"], p=[0.4, 0.25, 0.15, 0.2]))
+    kind = pick(rng, {"cone": 0.4, "drum": 0.25, "square": 0.15, "ball": 0.2})
     tilts = rng.random() < 0.3
     low = height + (0.035 if tilts else GAP)
     shade = _shade(rng, kind, rim, tall, low)
@@ -128,7 +128,7 @@ def spotlight(rng: Rng) -> Assembly:
     radius, long = rng.uniform(0.03, 0.09), rng.uniform(0.06, 0.2)
     thick = 0.08 * radius + 0.002
     reach = float(hypot(radius, 0.6 * long)) + 0.012
-    mount = str(rng.choice(["disc", "pole", "legs"]))
+    mount = pick(rng, ["disc", "pole", "legs"])
     high = rng.uniform(0.01, 0.04) if mount == "disc" else rng.uniform(0.1, 1.1)
     wide = radius * rng.uniform(1.0, 1.8)
     base = cylinder((0, 0, 0), (0, 0, min(high, 0.02)), wide, 0.9 * wide, 32)

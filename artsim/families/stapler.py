@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, Rng, revolute
+from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.outlines import rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, hull_of, loft, prism
 from artsim.model.kinematics import Array
@@ -102,7 +102,7 @@ def _base(rng: Rng, lay: Layout, arm_width: float) -> Solid:
     cheek = rng.uniform(0.0015, 0.003)
     inside, run = lay.inside, lay.run
     half = max(0.5 * arm_width * rng.uniform(0.95, 1.35), inside + cheek + 0.001)
-    kind = str(rng.choice(["plain", "boat", "round"], p=[0.5, 0.3, 0.2]))
+    kind = pick(rng, {"plain": 0.5, "boat": 0.3, "round": 0.2})
     if kind == "round":
         half = max(half, min(half * rng.uniform(1.3, 1.9), 0.3 * (back - front)))
         ends = [cylinder((x, 0, 0), (x, 0, 0.6 * lay.base), half, 0.94 * half, 32) for x in (front + half, back - half)]
@@ -155,7 +155,7 @@ def _arm(rng: Rng, lay: Layout, width: float) -> Solid:
     x = np.array(
         [front, 0.85 * front, 0.6 * front, min(neck - 0.004, 0.35 * front), neck, 0.0, rng.uniform(0.3, 0.6) * lay.tail]
     )
-    kind = str(rng.choice(["straight", "arched", "nosed", "wedge", "tapered"]))
+    kind = pick(rng, ["straight", "arched", "nosed", "wedge", "tapered"])
     if lay.back < lay.tail and rng.random() < 0.3:  # nothing behind the hinge keeps it from turning over
         kind = "tapered"
     heights: Array = {

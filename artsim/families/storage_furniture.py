@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.families import fronts
 from artsim.families.fronts import Cell, Moving, Style
-from artsim.making.assembly import Assembly, Rng
+from artsim.making.assembly import Assembly, Rng, pick
 from artsim.making.outlines import about
 from artsim.making.solids import Solid, box, cylinder, frame, hull, union
 
@@ -32,7 +32,7 @@ MOST_MOVING = 9
 
 def build(rng: Rng) -> Assembly:
     """A body with one to nine drawers, doors and trays, all closed at rest."""
-    kind = str(rng.choice(list(KINDS), p=[common for _, _, common in KINDS.values()]))
+    kind = pick(rng, {kind: common for kind, (_, _, common) in KINDS.items()})
     ranges, drawers, _ = KINDS[kind]
     width, depth, height, stand = (rng.uniform(*span) for span in ranges)
     stand = 0.0 if stand < 0.02 else stand
@@ -68,10 +68,10 @@ def _style(rng: Rng, kind: str, depth: float) -> Style:
         level=rng.random() < 0.2,
         thickness=rng.uniform(0.016, 0.024),
         overlay=rng.random() < 0.7,
-        panel=str(rng.choice(["slab", "shaker", "raised", "planks", "glass"], p=[0.45, 0.2, 0.22, 0.05, 0.08])),
+        panel=pick(rng, {"slab": 0.45, "shaker": 0.2, "raised": 0.22, "planks": 0.05, "glass": 0.08}),
         rail=rng.uniform(0.035, 0.075),
         recess=rng.uniform(0.005, 0.009),
-        handle=str(rng.choice(["bar", "bow", "knob", "block", "cup", "none"], p=[0.3, 0.2, 0.22, 0.08, 0.08, 0.12])),
+        handle=pick(rng, {"bar": 0.3, "bow": 0.2, "knob": 0.22, "block": 0.08, "cup": 0.08, "none": 0.12}),
         handle_length=rng.uniform(0.08, 0.35) if rng.random() < 0.8 else rng.uniform(0.35, 0.8),
         reach=rng.uniform(0.018, 0.04),
         grip=rng.uniform(0.004, 0.008),
@@ -122,8 +122,8 @@ def _fill(rng: Rng, cell: Cell, style: Style, drawers: float, must_move: bool) -
         "fixed": 0.04 * (not must_move and low_and_wide),
     }
     chances["drawer"] += sum(chances.values()) <= 0.0
-    weights = np.array(list(chances.values()))
-    what = str(rng.choice(list(chances), p=weights / weights.sum()))
+    total = np.sum(list(chances.values()))
+    what = pick(rng, {name: chance / total for name, chance in chances.items()})
     if what == "drawer":
         return fronts.drawer(rng, cell, style)
     if what == "double":
@@ -137,7 +137,7 @@ def _fill(rng: Rng, cell: Cell, style: Style, drawers: float, must_move: bool) -
     if what == "flap":
         return fronts.door(rng, cell, style, "top" if rng.random() < 0.7 else "bottom")
     outside = [name for name, outer in (("left", cell.outer_high[0]), ("right", cell.outer_low[0])) if outer]
-    return fronts.door(rng, cell, style, str(rng.choice(outside if outside else ["left", "right"])))
+    return fronts.door(rng, cell, style, pick(rng, outside if outside else ["left", "right"]))
 
 
 def _carcass(

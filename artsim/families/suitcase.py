@@ -12,7 +12,7 @@ import numpy as np
 
 from artsim.common.elementary import arctan2, cos, power, sin
 from artsim.families.details import bow_handle, rounded_tray
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import about, lifted, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, tube, union
 from artsim.model.kinematics import Array
@@ -22,7 +22,7 @@ GAP = 0.001
 
 def build(rng: Rng) -> Assembly:
     """A trolley, a briefcase or a bag."""
-    return (_trolley, _briefcase, _bag)[int(rng.choice(3, p=[0.5, 0.3, 0.2]))](rng)
+    return pick(rng, {_trolley: 0.5, _briefcase: 0.3, _bag: 0.2})(rng)
 
 
 def _shells(rng: Rng, x: float, y: float, low: float, high: float, seam: float) -> tuple[Solid, Solid]:
@@ -243,7 +243,7 @@ def _bag(rng: Rng) -> Assembly:
     face = x * (1.0 + (top - 1.0) * (pivot / z - 0.12) / 0.88)
     slope = float(arctan2((1.0 - top) * x, 0.88 * z))  # of the sides, which the bails hang down to
     limit = rng.uniform(0.55, 1.0) * (np.pi - 0.15 - slope)
-    for s in ((-1.0, 1.0), (-1.0,), (1.0,))[int(rng.choice(3, p=[0.55, 0.3, 0.15]))]:
+    for s in pick(rng, {(-1.0, 1.0): 0.55, (-1.0,): 0.3, (1.0,): 0.15}):
         place = (s * (face + wire + 0.004), 0.0, pivot)
         handle, lugs = _bail(place, half, height, wire, (-s, 0, 0), wire + 0.02)
         bag.body += lugs

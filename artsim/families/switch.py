@@ -12,7 +12,7 @@ import numpy as np
 
 from artsim.common.elementary import arctan, sin, tan
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, Rng, revolute
+from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.solids import Solid, box, cylinder, frame, hull_of, union
 from artsim.model.kinematics import Array
 
@@ -22,8 +22,8 @@ GAP = 0.0007
 def build(rng: Rng) -> Assembly:
     """A switch on a wall at x = 0; its front faces -X. A switch is off, its upper half out, or
     in the middle at rest."""
-    kind = str(rng.choice(["rocker", "toggle", "dimmer"], p=[0.65, 0.25, 0.1]))
-    count = int(rng.choice([1, 2, 3, 4], p=[0.35, 0.35, 0.18, 0.12]))
+    kind = pick(rng, {"rocker": 0.65, "toggle": 0.25, "dimmer": 0.1})
+    count = pick(rng, {1: 0.35, 2: 0.35, 3: 0.18, 4: 0.12})
     upright = kind == "rocker" and count > 1 and rng.random() < 0.2
     depth = with_tails(rng, (0.007, 0.022), (0.006, 0.032), 0.15)
     height = rng.uniform(0.065, 0.15)

@@ -15,7 +15,7 @@ from artsim.common.elementary import cos, sin
 from artsim.families.fronts import Style
 from artsim.families.proportions import unusual_sides, with_tails
 from artsim.families.table_parts import GAP, add_case, drop_leaves, four_legs, keyboard_tray, table_top, wheels
-from artsim.making.assembly import Assembly, Rng, prismatic, revolute, swivel
+from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute, swivel
 from artsim.making.outlines import UP, about, lifted, superellipse, turns
 from artsim.making.solids import Solid, box, cylinder, hull_of, loft, ring, union
 
@@ -26,8 +26,7 @@ LEAST_SHARES, MOST_SHARES = (0.105, 0.27, 0.12), (0.79, 0.985, 0.94)
 def build(rng: Rng) -> Assembly:
     """A table, all drawers and doors closed at rest."""
     table = Assembly("body", density=650.0)
-    kinds = (_apron, _pedestals, _case, _column)
-    kinds[rng.choice(4, p=[0.36, 0.27, 0.25, 0.12])](rng, table)
+    pick(rng, {_apron: 0.36, _pedestals: 0.27, _case: 0.25, _column: 0.12})(rng, table)
     return table
 
 
@@ -42,10 +41,10 @@ def _style(rng: Rng, deep: bool = False) -> Style:
         level=rng.random() < 0.2,
         thickness=rng.uniform(0.014, 0.022),
         overlay=rng.random() < 0.5,
-        panel=str(rng.choice(["slab", "shaker", "raised", "planks", "glass"], p=[0.62, 0.15, 0.15, 0.04, 0.04])),
+        panel=pick(rng, {"slab": 0.62, "shaker": 0.15, "raised": 0.15, "planks": 0.04, "glass": 0.04}),
         rail=rng.uniform(0.025, 0.06),
         recess=rng.uniform(0.004, 0.008),
-        handle=str(rng.choice(["bar", "bow", "knob", "block", "cup", "none"], p=[0.24, 0.15, 0.25, 0.05, 0.05, 0.26])),
+        handle=pick(rng, {"bar": 0.24, "bow": 0.15, "knob": 0.25, "block": 0.05, "cup": 0.05, "none": 0.26}),
         handle_length=rng.uniform(0.06, 0.4),
         reach=rng.uniform(0.014, 0.04),
         grip=rng.uniform(0.004, 0.008),
@@ -78,7 +77,7 @@ def _apron(rng: Rng, table: Assembly) -> None:
     rear = not both and rng.random() < 0.1
     deep = (0.47 if both else rng.uniform(0.6, 1.0)) * (2 * x - 2 * inset)
     half = y - 0.5 * size
-    grid = int(rng.choice([1, 2, 3, 4], p=[0.45, 0.25, 0.2, 0.1])), 1 if apron < 0.22 else int(rng.integers(1, 3))
+    grid = pick(rng, {1: 0.45, 2: 0.25, 3: 0.2, 4: 0.1}), 1 if apron < 0.22 else int(rng.integers(1, 3))
     # The fronts lie between the legs.
     style = replace(style, overlay=style.overlay and inset > 0.02)
     room = y - size - 0.001 if 2.0 * (y - size - 0.001) >= 0.2 else 0.1
@@ -111,7 +110,7 @@ def _pedestals(rng: Rng, table: Assembly) -> None:
     table.body += table_top(rng, depth, width, top, height)
     style = _style(rng)
     broad = min(with_tails(rng, (0.26, 0.5), (0.1, 0.6), 0.4), 0.38 * width)
-    sides = [(-1,), (1,), (-1, 1)][rng.choice(3, p=[0.3, 0.3, 0.4])]
+    sides = pick(rng, {(-1,): 0.3, (1,): 0.3, (-1, 1): 0.4})
     rolling = rng.random() < 0.1
     on_legs = not rolling and rng.random() < 0.35
     size = rng.uniform(0.03, 0.06)
@@ -123,7 +122,7 @@ def _pedestals(rng: Rng, table: Assembly) -> None:
     broad = min(broad, outer - 0.1) if len(sides) == 2 else broad  # room for knees
     deep = rng.uniform(0.75, 1.0) * 2 * x
     recipe, alike = int(rng.integers(2**31)), rng.random() < 0.6
-    doors = float(rng.choice([0.0, 0.4, 1.0], p=[0.45, 0.3, 0.25]))
+    doors = pick(rng, {0.0: 0.45, 0.4: 0.3, 1.0: 0.25})
     overhang = style.thickness + 0.004 if style.overlay else 0.0
     front = -x + overhang
     for side in sides:
@@ -147,7 +146,7 @@ def _pedestals(rng: Rng, table: Assembly) -> None:
     far = outer - (broad if 1 in sides else panel) + 0.001
     deepest, drop = front + deep - overhang, rng.uniform(0.2, 0.8) * (top - low_z)
     table.body += box((deepest - 0.03, deepest - 0.012), (near, far), (top - drop, top + 0.001))
-    between = str(rng.choice(["case", "tray", "nothing"], p=[0.45, 0.2, 0.35]))
+    between = pick(rng, {"case": 0.45, "tray": 0.2, "nothing": 0.35})
     if far - near < 0.2:
         between = "nothing"
     if between == "case":
@@ -173,7 +172,7 @@ def _case(rng: Rng, table: Assembly) -> None:
     thick, over = rng.uniform(0.012, 0.05), rng.uniform(0.0, 0.05)
     top, x, y = height - thick, depth / 2 - min(over, 0.1 * depth), width / 2 - over
     style = _style(rng, depth > width)
-    stand = str(rng.choice(["legs", "plinth", "wheels"], p=[0.55, 0.3, 0.15]))
+    stand = pick(rng, {"legs": 0.55, "plinth": 0.3, "wheels": 0.15})
     low = {"legs": rng.uniform(0.12, 0.65), "plinth": rng.uniform(0.03, 0.2)}.get(stand, 0.0) * height
     low = 0.07 if stand == "wheels" else min(low, top - 0.12)
     ahead = style.thickness + 0.004 if style.overlay else 0.0
@@ -231,7 +230,7 @@ def _column(rng: Rng, table: Assembly) -> None:
         base += cylinder((0, 0, 0), (0, 0, 0.02), span, 0.9 * span, 32) + cylinder(
             (0, 0, 0.02), (0, 0, 0.06), 2 * radius, radius, 24
         )
-    kind = str(rng.choice(["turning", "tipping", "rising"]))
+    kind = pick(rng, ["turning", "tipping", "rising"])
     top = height - thick
     if kind == "rising":
         sleeve = 0.62 * top

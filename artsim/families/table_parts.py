@@ -8,7 +8,7 @@ import numpy as np
 
 from artsim.families import fronts
 from artsim.families.fronts import Cell, Moving, Style
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import Vector, about
 from artsim.making.solids import Solid, box, cylinder, hull_of, tube, union
 
@@ -92,10 +92,10 @@ def _fill(rng: Rng, cell: Cell, style: Style, doors: float, must_move: bool) -> 
                 fronts.double_door(rng, cell, style) if rng.random() < 0.85 else fronts.sliding_doors(rng, cell, style)
             )
         if width < 1.3 * height:
-            return fronts.door(rng, cell, style, str(rng.choice(["left", "right"])))
-        return fronts.door(rng, cell, style, str(rng.choice(["bottom", "top"])))
+            return fronts.door(rng, cell, style, pick(rng, ["left", "right"]))
+        return fronts.door(rng, cell, style, pick(rng, ["bottom", "top"]))
     if height > 0.65:
-        return fronts.door(rng, cell, style, str(rng.choice(["left", "right"])))
+        return fronts.door(rng, cell, style, pick(rng, ["left", "right"]))
     return fronts.drawer(rng, cell, style)
 
 
@@ -118,7 +118,7 @@ def table_top(rng: Rng, depth: float, width: float, low: float, high: float) -> 
 
 def four_legs(rng: Rng, x: float, y: float, low: float, high: float, size: float, splay: bool) -> Solid:
     """Four legs within a rectangle: square, tapered, round, turned or a loop at either end."""
-    kind = str(rng.choice(["square", "tapered", "round", "turned", "loops"], p=[0.3, 0.22, 0.22, 0.13, 0.13]))
+    kind = pick(rng, {"square": 0.3, "tapered": 0.22, "round": 0.22, "turned": 0.13, "loops": 0.13})
     half, taper = size / 2, rng.uniform(0.4, 0.9)
     tall = high - low
     out = min(0.12 * tall, 0.2 * min(x, y)) if splay and kind in ("tapered", "round") else 0.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.families.details import dial, push_button
-from artsim.making.assembly import Assembly, Rng, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
 from artsim.making.outlines import about, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, frame, hull_of, posts, prism, tube, union
 from artsim.model.kinematics import Array
@@ -19,7 +19,7 @@ GAP = 0.001
 
 def build(rng: Rng) -> Assembly:
     """A toaster with its levers up at rest. The slots run along X, the levers are at -X."""
-    kind = str(rng.choice(["two", "four", "long"], p=[0.6, 0.2, 0.2]))
+    kind = pick(rng, {"two": 0.6, "four": 0.2, "long": 0.2})
     count = {"two": 2, "four": 4, "long": int(rng.integers(1, 3))}[kind]
     length = rng.uniform(0.34, 0.5) if kind == "long" else rng.uniform(0.23, 0.36)
     wide = rng.uniform(0.024, 0.044)  # of a slot
@@ -27,7 +27,7 @@ def build(rng: Rng) -> Assembly:
     half = 0.5 * (count - 1) * pitch + 0.5 * wide + rng.uniform(0.024, 0.065)
     foot, height = rng.uniform(0.005, 0.025), rng.uniform(0.13, 0.25)
     low, high = np.array([0.0, -half, foot]), np.array([length, half, foot + height])
-    shape = str(rng.choice(["box", "arch", "loaf", "block"]))
+    shape = pick(rng, ["box", "arch", "loaf", "block"])
     block = _block(rng, shape, low, high, count, pitch, wide)
 
     margin = rng.uniform(0.03, 0.05) + (0.03 if shape == "loaf" else 0.0)

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from artsim.making.assembly import Assembly, JointSpec, Rng, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, Rng, pick, prismatic, revolute
 from artsim.making.outlines import about, lifted, superellipse
 from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, tray, tube, union
 from artsim.model.kinematics import Array
@@ -44,7 +44,7 @@ def build(rng: Rng) -> Assembly:
     length, width = rng.uniform(0.38, 0.56), rng.uniform(0.33, 0.42)
     height = rng.uniform(0.34, 0.48)
     power = rng.choice([2.0, rng.uniform(2.0, 2.6), rng.uniform(3.0, 6.0)], p=[0.4, 0.4, 0.2])
-    tank = str(rng.choice(["low", "high", "wall"], p=[0.7, 0.1, 0.2]))
+    tank = pick(rng, {"low": 0.7, "high": 0.1, "wall": 0.2})
     hung = tank == "wall" and rng.random() < 0.7
     cover = _Cover(
         rng.uniform(0.0, 0.012), rng.uniform(0.014, 0.028), rng.uniform(0.012, 0.03), rng.uniform(0.015, 0.03)
@@ -101,7 +101,7 @@ def _bowl(rng: Rng, length: float, width: float, height: float, power: float, ba
     )
     if hung:
         return solid
-    kind = str(rng.choice(["pedestal", "skirt", "box"]))
+    kind = pick(rng, ["pedestal", "skirt", "box"])
     foot = rng.uniform(0.5, 0.85)
     if kind == "pedestal":
         waist = rng.uniform(0.35, 0.5)
@@ -145,7 +145,7 @@ def _low_cistern(rng: Rng, moving: list[Moving], back: float, width: float, heig
         box((start, start + 0.7 * deep), 0.6 * taper * half, (foot - 0.06, foot + 0.01)),
         box((start - 0.05, start + 0.02), 0.3 * half, (0.5 * height, 0.5 * height + 0.03)),
     )
-    flush = str(rng.choice(["lever", "side lever", "button", "two buttons"], p=[0.35, 0.15, 0.25, 0.25]))
+    flush = pick(rng, {"lever": 0.35, "side lever": 0.15, "button": 0.25, "two buttons": 0.25})
     over, thick = rng.uniform(0.004, 0.02), rng.uniform(0.02, 0.045)
     low, high = (start - over, -half - over, top + GAP), (start + deep + over, half + over, top + GAP + thick)
     middle = (start + 0.5 * deep, 0.0)
@@ -286,7 +286,7 @@ def _seat_and_lid(
             box((axis_x - 0.01, axis_x), (near, far), (top + GAP, top + GAP + 0.5 * cover.lid)),
         )
     hinge = (axis_x, 0.0, at)
-    kind = str(rng.choice(["both", "in step", "lid", "seat"], p=[0.45, 0.2, 0.25, 0.1]))
+    kind = pick(rng, {"both": 0.45, "in step": 0.2, "lid": 0.25, "seat": 0.1})
     if kind == "lid":
         stops = union(
             cylinder((0.3 * length, y, height - 0.002), (0.3 * length, y, low + 0.002), 0.01, sections=10)

@@ -12,7 +12,7 @@ import numpy as np
 
 from artsim.families.details import rounded_tray
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, Rng, continuous, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, pick, revolute
 from artsim.making.solids import Solid, box, cylinder, hull_of, tube, union
 
 GAP = 0.0015
@@ -33,7 +33,7 @@ class Bin:
 
 def build(rng: Rng) -> Assembly:
     """A bin, closed at rest."""
-    kind = str(rng.choice(["pedal", "swing", "wheelie", "halves"], p=[0.45, 0.2, 0.2, 0.15]))
+    kind = pick(rng, {"pedal": 0.45, "swing": 0.2, "wheelie": 0.2, "halves": 0.15})
     if kind == "wheelie":
         return _wheelie(rng)
     size = _size(rng)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.families.keys import key_outline, sleeve
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import FRONT, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, hull, hull_of, prism, ring, tube, union
 from artsim.model.kinematics import Array
@@ -48,12 +48,8 @@ def build(rng: Rng) -> Assembly:
     thick = plug.thick * rng.triangular(1.4, 1.9, 4.2)
     length = plug.reach * rng.uniform(1.1, 4.2)
     stick = _Stick(length, half, thick, plug)
-    kind = str(rng.choice(["cap", "two caps", "swivel", "sleeve", "slider"], p=[0.3, 0.1, 0.28, 0.14, 0.18]))
     usb = Assembly(density=1200.0)
-    if kind == "slider":
-        _retracting(rng, usb, stick)
-    else:
-        {"cap": _capped, "two caps": _two_caps, "swivel": _swivel, "sleeve": _sleeved}[kind](rng, usb, stick)
+    pick(rng, {_capped: 0.3, _two_caps: 0.1, _swivel: 0.28, _sleeved: 0.14, _retracting: 0.18})(rng, usb, stick)
     return usb
 
 
@@ -99,8 +95,8 @@ def _outline(kind: str, x0: float, x1: float, half: float, rng: Rng) -> list[Arr
 
 def _body(rng: Rng, stick: _Stick, x0: float, x1: float, plain: bool = False) -> Solid:
     """The body between two x, with bevels, ribs or studs unless it is to be plain."""
-    kinds = ["rectangle", "tapered", "waisted", "oval", "round end", "drum"]
-    kind = "rectangle" if plain else str(rng.choice(kinds, p=[0.3, 0.14, 0.16, 0.12, 0.16, 0.12]))
+    kinds = {"rectangle": 0.3, "tapered": 0.14, "waisted": 0.16, "oval": 0.12, "round end": 0.16, "drum": 0.12}
+    kind = "rectangle" if plain else pick(rng, kinds)
     half, thick = stick.half, stick.thick
     if kind == "drum":
         low, high = np.array([x0, -half, -thick]), np.array([x1, half, thick])

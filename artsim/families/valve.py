@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.making.assembly import Assembly, Rng, continuous, revolute, screw
+from artsim.making.assembly import Assembly, Rng, continuous, pick, revolute, screw
 from artsim.making.outlines import UP, circle, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube
 from artsim.model.kinematics import Array
@@ -23,7 +23,7 @@ FLANGE = 1.9
 def build(rng: Rng) -> Assembly:
     """Valves on a pipe along Y, with their stems up or towards the front; all are shut at rest."""
     pipe = rng.uniform(0.02, 0.05)  # outer radius
-    count = int(rng.choice([1, 2, 3], p=[0.7, 0.2, 0.1]))
+    count = pick(rng, {1: 0.7, 2: 0.2, 3: 0.1})
     lever = rng.random() < 0.3
     spacing = pipe * rng.uniform(5.5, 7.5)
     room = 0.47 * spacing if count > 1 else np.inf

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from artsim.common.elementary import cos, power, sin
-from artsim.making.assembly import Rng
+from artsim.making.assembly import Rng, pick
 from artsim.making.outlines import UP, about, lifted, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, loft, ring, tube, union
 from artsim.model.kinematics import Array
@@ -146,7 +146,7 @@ def pump_head(rng: Rng, low: float, stem: float, size: float, reach: float, down
     """
     tall = size * rng.uniform(0.45, 1.3)
     solid = cylinder((0, 0, low - down), (0, 0, low + 0.5 * tall), stem, sections=14)
-    kind = str(rng.choice(["saddle", "disc", "hook", "block", "drop"]))
+    kind = pick(rng, ["saddle", "disc", "hook", "block", "drop"])
     droop = rng.uniform(0.0, 0.25)
     r = min(size * rng.uniform(0.3, 0.48), 0.48 * tall)
     middle = low + 0.5 * tall

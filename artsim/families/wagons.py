@@ -7,7 +7,7 @@ import numpy as np
 from artsim.common.elementary import arctan2, cos, sin
 from artsim.families.details import rounded_tray
 from artsim.families.wheels import GAP, STEEL, Wheels, bar
-from artsim.making.assembly import Assembly, Rng, revolute
+from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.outlines import UP, about
 from artsim.making.solids import box, cylinder, hull_of, tube, union
 
@@ -77,7 +77,7 @@ def wagon(rng: Rng) -> Assembly:
 def hand_cart(rng: Rng) -> Assembly:
     """A box or a bed between two large wheels, with shafts to the front, and by chance a tailgate that folds down."""
     wheels = Wheels(rng, rng.uniform(0.2, 0.45), rng.uniform(0.03, 0.07))
-    wheels.style = str(rng.choice(["spokes", "spokes", "rim"]))
+    wheels.style = pick(rng, ["spokes", "spokes", "rim"])
     wheels.spokes, wheels.hub = int(rng.integers(6, 11)), wheels.radius * rng.uniform(0.12, 0.25)
     length, half = rng.uniform(0.8, 1.5), rng.uniform(0.28, 0.5)
     low = wheels.radius + rng.uniform(-0.02, 0.12)

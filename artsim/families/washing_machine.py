@@ -14,7 +14,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.details import dial, front_handle, holed_plate, push_button, side_hinge
 from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import about
 from artsim.making.solids import Solid, box, cylinder, frame, hull, posts, ring, tray, vessel
 from artsim.model.kinematics import Array
@@ -150,7 +150,7 @@ def _porthole(rng: Rng, z: float, hole: float, outer: float, thick: float, bowl:
         grip = 0.25 * outer
         return solid + box((x0 - 0.012, x0 + 0.01), (y - 0.004, y + 0.014), (z - grip, z + grip))
     start, end = (x0, 0.02 - 0.97 * outer, z - 0.1 * outer), (x0, 0.02 - 0.97 * outer, z + 0.1 * outer)
-    return solid + front_handle(str(rng.choice(["bow", "flat"])), start, end, reach, 0.006)
+    return solid + front_handle(pick(rng, ["bow", "flat"]), start, end, reach, 0.006)
 
 
 # --- top loaders -----------------------------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.making.assembly import Assembly, Rng, continuous
+from artsim.making.assembly import Assembly, Rng, continuous, pick
 from artsim.making.outlines import UP, Vector, about, turns
 from artsim.making.solids import Solid, box, cylinder, hull_of, ring, tube
 
@@ -20,7 +20,7 @@ class Wheels:
 
     def __init__(self, rng: Rng, radius: float, wide: float):
         self.rng, self.radius, self.wide = rng, radius, wide
-        self.style = str(rng.choice(["disc", "rim", "spokes"]))
+        self.style = pick(rng, ["disc", "rim", "spokes"])
         self.spokes = int(rng.integers(3, 7))
         self.hub = radius * rng.uniform(0.2, 0.45)
         self.sections = 20 if radius > 0.1 else 14  # small wheels need fewer to look round

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.families.details import bar_handle, grid_panel, swing_limits
-from artsim.making.assembly import Assembly, Rng, prismatic, revolute
+from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
 from artsim.making.outlines import about
 from artsim.making.solids import Solid, box, cylinder, frame
 from artsim.model.kinematics import Array
@@ -27,8 +27,8 @@ HINGES = {
 
 def build(rng: Rng) -> Assembly:
     """A window, mostly closed at rest."""
-    kind = str(rng.choice(["hinged", "sliding", "hung"], p=[0.6, 0.22, 0.18]))
-    count = int(rng.choice([1, 2, 3], p=[0.4, 0.4, 0.2]))
+    kind = pick(rng, {"hinged": 0.6, "sliding": 0.22, "hung": 0.18})
+    count = pick(rng, {1: 0.4, 2: 0.4, 3: 0.2})
     if kind == "sliding":
         count = max(count, 2)
     width = rng.uniform(0.35, 1.0) * (count if kind != "hung" else 1)
@@ -39,7 +39,7 @@ def build(rng: Rng) -> Assembly:
     if kind != "hinged":
         sash = min(sash, 0.035)
         depth = max(depth, (count if kind == "sliding" else 2) * (sash + GAP) + 0.015)
-    glazing = int(rng.choice([1, 2, 3], p=[0.6, 0.25, 0.15])), int(rng.choice([1, 2, 3], p=[0.55, 0.3, 0.15]))
+    glazing = pick(rng, {1: 0.6, 2: 0.25, 3: 0.15}), pick(rng, {1: 0.55, 2: 0.3, 3: 0.15})
     rail = rng.uniform(0.035, 0.065)
     window = Assembly(density=900.0)
     body = _frame(rng, width, height, depth, bar)
@@ -93,7 +93,7 @@ def _hinged(
     meeting = count == 2 and rng.random() < 0.45
     edges = np.linspace(-width / 2, width / 2, count + 1)
     sideways = rng.random() < 0.65 or meeting
-    own = str(rng.choice(["left", "right"] if sideways else ["top", "top", "bottom"]))
+    own = pick(rng, ["left", "right"] if sideways else ["top", "top", "bottom"])
     limit = np.deg2rad(rng.uniform(40.0, 178.0) if sideways else rng.uniform(20.0, 75.0))
     ajar = rng.uniform(0.1, 0.6) if rng.random() < 0.25 else 0.0
     fixed = int(rng.integers(count)) if count > 1 and not meeting and rng.random() < 0.35 else -1

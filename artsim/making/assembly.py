@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -16,6 +17,13 @@ from artsim.model.objects import ArticulatedObject, Body, Part, content_sha256
 
 Rng = np.random.Generator
 """What families draw from: an explicit generator, never a global one."""
+Choice = TypeVar("Choice")
+
+
+def pick(rng: Rng, options: Mapping[Choice, float] | Sequence[Choice]) -> Choice:
+    """One of several options, each with its chance, or all equally likely: ``pick(rng, {"bar": 0.6, "none": 0.4})``."""
+    chances = list(options.values()) if isinstance(options, Mapping) else None
+    return list(options)[int(rng.choice(len(options), p=chances))]
 
 
 @dataclass(frozen=True)
