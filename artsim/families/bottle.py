@@ -17,7 +17,7 @@ from artsim.common.elementary import cos, sin
 from artsim.families.vessels import GAP, Level, cap, cross_section, dome, grip_loop, moulded, neck, pump_head, ribs
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute, screw
 from artsim.making.outlines import UP
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube
+from artsim.making.solids import Solid, box, ellipsoid, hull_of, ring, rod, tube
 
 DENSITY = 300.0  # kg/m^3, as the pieces are solid and real ones are hollow
 SHAPES = {"wine": 0.1, "beer": 0.08, "water": 0.12, "shampoo": 0.16, "cone": 0.08, "ball": 0.07, "jar": 0.12,
@@ -193,8 +193,8 @@ def _screw_cap(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     if style < 0.2:
         lid += dome(0.97 * radius, high - 0.0005, rng.uniform(0.15, 0.9) * radius)
     elif style < 0.3:  # a spout with a knob
-        lid += cylinder((0, 0, high - 0.0005), (0, 0, high + 0.5 * radius), 0.75 * radius, 0.35 * radius)
-        lid += cylinder((0, 0, high), (0, 0, high + radius), 0.3 * radius) + dome(0.42 * radius, high + radius, 0.004)
+        lid += rod(0, 0, (high - 0.0005, high + 0.5 * radius), 0.75 * radius, 0.35 * radius)
+        lid += rod(0, 0, (high, high + radius), 0.3 * radius) + dome(0.42 * radius, high + radius, 0.004)
     elif style < 0.4:  # a loop to carry it by
         angles = np.linspace(0.0, np.pi, 8)
         r = 0.7 * radius
@@ -210,24 +210,24 @@ def _stopper(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     """A cork, a glass ball or a disc on a plug that sits in the neck."""
     plug = (mouth.bore - GAP) * cos(np.pi / 18) * 0.98
     low, rim = mouth.rim - 0.7 * (mouth.rim - mouth.foot), mouth.rim + GAP
-    lid = cylinder((0, 0, low), (0, 0, rim + 0.002), 0.9 * plug, plug, 18)
+    lid = rod(0, 0, (low, rim + 0.002), 0.9 * plug, plug, 18)
     r = mouth.radius
     kind = pick(rng, ["cork", "ball", "disc", "crystal", "knob"])
     if kind == "cork":
-        lid += cylinder((0, 0, rim), (0, 0, rim + r * rng.uniform(0.4, 1.2)), r * rng.uniform(0.9, 1.1), r, 20)
+        lid += rod(0, 0, (rim, rim + r * rng.uniform(0.4, 1.2)), r * rng.uniform(0.9, 1.1), r, 20)
     elif kind == "ball":
         size = r * rng.uniform(1.0, 1.8)
-        lid += cylinder((0, 0, rim), (0, 0, rim + 0.3 * r), r, 0.8 * r, 20)
+        lid += rod(0, 0, (rim, rim + 0.3 * r), r, 0.8 * r, 20)
         lid += ellipsoid((0, 0, rim + 0.9 * size), (size, size, 0.9 * size), 16)
     elif kind == "disc":
-        lid += cylinder((0, 0, rim), (0, 0, rim + 0.3 * r), 1.3 * r, 1.2 * r) + dome(0.5 * r, rim + 0.3 * r, 0.5 * r)
+        lid += rod(0, 0, (rim, rim + 0.3 * r), 1.3 * r, 1.2 * r) + dome(0.5 * r, rim + 0.3 * r, 0.5 * r)
     elif kind == "crystal":
         top = rim + r * rng.uniform(1.2, 2.4)
-        lid += cylinder((0, 0, rim), (0, 0, 0.5 * (rim + top)), 0.7 * r, 1.4 * r, 8)
-        lid += cylinder((0, 0, 0.5 * (rim + top) - 1e-4), (0, 0, top), 1.4 * r, 0.5 * r, 8)
+        lid += rod(0, 0, (rim, 0.5 * (rim + top)), 0.7 * r, 1.4 * r, 8)
+        lid += rod(0, 0, (0.5 * (rim + top) - 1e-4, top), 1.4 * r, 0.5 * r, 8)
     else:
-        lid += cylinder((0, 0, rim), (0, 0, rim + 0.25 * r), 1.15 * r)
-        lid += cylinder((0, 0, rim), (0, 0, rim + 1.1 * r), 0.35 * r) + ellipsoid((0, 0, rim + 1.4 * r), 0.6 * r, 12)
+        lid += rod(0, 0, (rim, rim + 0.25 * r), 1.15 * r)
+        lid += rod(0, 0, (rim, rim + 1.1 * r), 0.35 * r) + ellipsoid((0, 0, rim + 1.4 * r), 0.6 * r, 12)
     depth = mouth.rim - low
     bottle.add("body", body)
     bottle.add("lid", lid, prismatic("body", UP, 0.0, depth * rng.uniform(1.0, 3.0), (0, 0, rim)))
@@ -243,11 +243,11 @@ def _flip_top(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     wall = 0.12 * radius
     lid = cap(0.98 * radius, wall, base, base + tall, top=0.98 * radius * rng.uniform(0.75, 1.0))
     z = base + r
-    lid += cylinder((x, -half, z), (x, half, z), r, sections=12)
+    lid += rod(x, (-half, half), z, r, sections=12)
     lid += box((0.8 * radius, x), half, (base, base + 1.6 * r))
     for s in (-1.0, 1.0):  # lugs at both ends of the barrel
         y0, y1 = sorted((s * (half + 0.0006), s * (half + 0.0006 + 1.5 * r)))
-        collar += hull_of(cylinder((x, y0, z), (x, y1, z), r, sections=10),
+        collar += hull_of(rod(x, (y0, y1), z, r, sections=10),
                           box((0.7 * radius, y0, high - 2.5 * r), (x, y1, high - r)))  # fmt: skip
     if rng.random() < 0.6:  # a thumb rest at the front
         tip = 0.98 * radius
@@ -255,7 +255,7 @@ def _flip_top(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
                            (-0.9 * tip, 0.3 * radius, base + 0.3 * tall), fillet=0.1 * tall)  # fmt: skip
     spout = 0.6 * (0.98 * radius - wall)
     if tall > 0.35 * radius:
-        collar += cylinder((0, 0, high - 0.0005), (0, 0, high + 0.4 * tall), 0.5 * spout, 0.35 * spout, 14)
+        collar += rod(0, 0, (high - 0.0005, high + 0.4 * tall), 0.5 * spout, 0.35 * spout, 14)
     # Beyond 90 degrees the lid's back dips beside the collar, above the shoulder.
     limit = np.deg2rad(rng.uniform(80, 135 if tall < 0.6 * (high - low) else 95))
     turning = rng.random() < 0.35
@@ -296,12 +296,12 @@ def _sprayer(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     tall, reach = radius * rng.uniform(1.2, 2.0), radius * rng.uniform(2.0, 3.2)
     top = high + tall
     deck = high + 0.45 * tall  # the trigger hangs below it
-    head += hull_of(cylinder((0, 0, high - 0.001), (0, 0, high + 0.001), 0.8 * radius, sections=16),
+    head += hull_of(rod(0, 0, (high - 0.001, high + 0.001), 0.8 * radius, sections=16),
                     box((-0.35 * radius, -0.8 * wide, deck), (0.9 * radius, 0.8 * wide, deck + 0.001)))  # fmt: skip
     head += box((-reach, radius * rng.uniform(1.0, 1.9)), wide, (deck, top), fillet=0.35 * wide)
     nozzle = 0.55 * min(wide, 0.5 * (top - deck))
     middle = 0.5 * (deck + top)
-    head += cylinder((-reach - 0.35 * radius, 0, middle), (-reach + 0.002, 0, middle), nozzle, 1.2 * nozzle, 6)
+    head += rod((-reach - 0.35 * radius, -reach + 0.002), 0, middle, nozzle, 1.2 * nozzle, 6)
     x = -0.72 * reach
     length = radius * rng.uniform(1.4, 2.4)
     z = deck - 0.0018
@@ -322,8 +322,8 @@ def _cup(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     plug = (mouth.bore - GAP) * cos(np.pi / 18) * 0.98
     rim = mouth.rim + GAP
     tall = mouth.radius * rng.uniform(0.4, 0.9)
-    stopper = cylinder((0, 0, 0.5 * (mouth.foot + mouth.rim)), (0, 0, rim + 0.001), plug, sections=18)
-    stopper += cylinder((0, 0, rim), (0, 0, rim + tall), mouth.radius, 0.9 * mouth.radius, 20)
+    stopper = rod(0, 0, (0.5 * (mouth.foot + mouth.rim), rim + 0.001), plug, sections=18)
+    stopper += rod(0, 0, (rim, rim + tall), mouth.radius, 0.9 * mouth.radius, 20)
     turns = 2.0 * np.pi * rng.uniform(0.5, 2.0)
     depth = 0.5 * (mouth.rim - mouth.foot)
     inner = (mouth.radius * 1.04 + GAP) / cos(np.pi / 24)
@@ -351,10 +351,10 @@ def _bail(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     tall = radius * rng.uniform(0.14, 0.4)
     x, half = radius + 1.2 * r, radius * rng.uniform(0.2, 0.4)
     z = rim + r
-    lid = cylinder((0, 0, rim), (0, 0, rim + tall), radius, 0.92 * radius)
+    lid = rod(0, 0, (rim, rim + tall), radius, 0.92 * radius)
     if rng.random() < 0.6:
         lid += dome(0.85 * radius, rim + tall - 1e-4, rng.uniform(0.1, 0.45) * radius)
-    lid += cylinder((x, -half, z), (x, half, z), r, sections=12) + box((0.7 * radius, x), half, (rim, rim + r))
+    lid += rod(x, (-half, half), z, r, sections=12) + box((0.7 * radius, x), half, (rim, rim + r))
     low = 0.5 * (mouth.foot + mouth.rim)
     body += ring((0, 0, low), UP, 0.98 * mouth.radius, mouth.radius + r, 1.6 * r, 20)
     for s in (-1.0, 1.0):

@@ -14,7 +14,7 @@ from artsim.families.details import bow_handle, knob, rounded_tray
 from artsim.families.proportions import unusual_sides, with_tails
 from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.outlines import about
-from artsim.making.solids import Solid, box, cylinder, frame, hull, posts, tray, union
+from artsim.making.solids import Solid, box, frame, hull, posts, rod, tray, union
 
 GAP = 0.0015
 
@@ -71,7 +71,7 @@ def _rigid(rng: Rng) -> Assembly:
     chest.add("body", body)
     spans = [(-0.8, -0.6), (0.6, 0.8)] if rng.random() < 0.7 else [(-0.85, 0.85)]
     for first, last in spans:
-        lid += cylinder((axis_x, first * y, seam), (axis_x, last * y, seam), barrel, sections=12)
+        lid += rod(axis_x, (first * y, last * y), seam, barrel, sections=12)
         lid += box((x - wall, axis_x), (first * y, last * y), (seam + 0.0003, seam + 0.9 * barrel))
     limit = np.deg2rad(rng.choice([rng.uniform(75.0, 115.0), rng.uniform(115.0, 170.0)]))
     chest.add("lid", lid, revolute("body", (0, 1, 0), (axis_x, 0, seam), 0.0, limit))
@@ -206,7 +206,7 @@ def _latches(rng: Rng, chest: Assembly, front: float, y: float, seam: float, top
         middle = share * y
         axis_x = -front - 2.2 * pin
         z = seam + upper
-        solid = cylinder((axis_x, middle - width, z), (axis_x, middle + width, z), pin, sections=12)
+        solid = rod(axis_x, (middle - width, middle + width), z, pin, sections=12)
         solid += box((axis_x - 0.002, axis_x + 0.001), about(middle, width), (seam - 1.4 * upper, z), fillet=0.001)
         turn = revolute("lid", (0, 1, 0), (axis_x, middle, z), 0.0, np.deg2rad(85.0))
         chest.add(f"latch_{number}", solid, turn, density=2000.0)

@@ -13,7 +13,7 @@ from artsim.common.elementary import cos, hypot, power, sin
 from artsim.common.products import norm
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, Rng, pick, revolute
-from artsim.making.solids import Solid, box, cylinder, ring, tube, vessel
+from artsim.making.solids import Solid, box, ring, rod, tube, vessel
 from artsim.model.kinematics import Array
 
 SIDES = 20
@@ -133,9 +133,9 @@ def _ear(side: float, span: tuple[float, float, float], pivot: float, pin: float
     if boxy:
         solid = box(half, (min(wall, outer), max(wall, outer)), (pivot - 1.3 * half, pivot + half))
     else:
-        solid = cylinder((0, wall, pivot), (0, outer, pivot), 1.2 * half, 0.9 * half, 20)
-    solid += cylinder((0, outer - side * 0.001, pivot), (0, tip, pivot), 0.85 * pin, sections=12)
-    return solid + cylinder((0, tip, pivot), (0, tip + side * 0.002, pivot), 1.6 * pin, sections=12)
+        solid = rod(0, (wall, outer), pivot, 1.2 * half, 0.9 * half, 20)
+    solid += rod(0, (outer - side * 0.001, tip), pivot, 0.85 * pin, sections=12)
+    return solid + rod(0, (tip, tip + side * 0.002), pivot, 1.6 * pin, sections=12)
 
 
 def _bail(rng: Rng, half: float, reach: float, pivot: float, pin: float, wire: float) -> tuple[Solid, Array, Array]:
@@ -164,7 +164,7 @@ def _bail(rng: Rng, half: float, reach: float, pivot: float, pin: float, wire: f
     if rng.random() < 0.6:
         z = path[:, 2].max()
         grip, length = rng.uniform(0.007, 0.013), 0.35 * half
-        solid += cylinder((0, -length, z), (0, length, z), grip, sections=16)
+        solid += rod(0, (-length, length), z, grip, sections=16)
         radius = max(radius, grip)
     steps = np.linspace(0.0, len(path) - 1.0, 8 * len(path))
     line = np.column_stack([np.interp(steps, np.arange(len(path)), column) for column in path.T])

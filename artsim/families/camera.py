@@ -15,7 +15,7 @@ from artsim.common.elementary import cos, sin
 from artsim.families.lenses import Lens
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute, swivel
 from artsim.making.outlines import FRONT, UP, about, turns
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, prism, ring, tube
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, prism, ring, rod, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
@@ -200,12 +200,12 @@ def _back(rng: Rng, camera: Assembly, shell: Shell) -> None:
             z = 0.4 * height
             wheel = ring((x + 0.3 * size, y, z), (1, 0, 0), 1.1 * size, 1.9 * size, 0.6 * size, 16)
             camera.add("wheel", wheel, continuous("body", (1, 0, 0), (x, y, z)), label="dial")
-            button = cylinder((x + 0.0012, y, z), (x + 0.0012 + 0.6 * size, y, z), 0.8 * size, sections=14)
+            button = rod((x + 0.0012, x + 0.0012 + 0.6 * size), y, z, 0.8 * size, sections=14)
             camera.add("button", button, prismatic("body", FRONT, 0.0, 0.001, (x, y, z)))
         elif style == "row" and size > 0.001:
             for number in range(int(rng.integers(1, 4))):
                 z = height * (0.2 + 0.2 * number)
-                button = cylinder((x + 0.0012, y, z), (x + 0.0012 + 0.5 * size, y, z), size, sections=14)
+                button = rod((x + 0.0012, x + 0.0012 + 0.5 * size), y, z, size, sections=14)
                 camera.add(f"button_{number}", button, prismatic("body", FRONT, 0.0, 0.001, (x, y, z)))
     if rng.random() < 0.2:  # a door at the right side
         y, t = half + 0.001, 0.0025
@@ -267,8 +267,8 @@ def _camcorder(rng: Rng) -> Assembly:
     if rng.random() < 0.5:
         z = 0.85 * height
         r = 0.22 * height * rng.uniform(0.6, 1.0)
-        eye = cylinder((depth + 0.001 + r, 0, z), (depth + rng.uniform(0.03, 0.06), 0, z), 0.8 * r, r, 16)
-        eye += cylinder((depth + 0.001 + r, -0.6 * half, z), (depth + 0.001 + r, 0.6 * half, z), r, sections=14)
+        eye = rod((depth + 0.001 + r, depth + rng.uniform(0.03, 0.06)), 0, z, 0.8 * r, r, 16)
+        eye += rod(depth + 0.001 + r, (-0.6 * half, 0.6 * half), z, r, sections=14)
         tilt = revolute("body", (0, -1, 0), (depth + 0.001 + r, 0, z), 0.0, rng.uniform(0.4, 1.2))
         camera.add("viewfinder", eye, tilt)
     for number, x in enumerate((0.3, 0.9)[: int(rng.integers(0, 3))]):
@@ -289,7 +289,7 @@ def _swivel(rng: Rng) -> Assembly:
         head, front, low = ellipsoid((0, 0, 0), r, 20), r, 1.2 * r
     elif shape == "bullet":
         long = r * rng.uniform(1.4, 2.6)
-        head = cylinder((-long, 0, 0), (0.8 * long, 0, 0), r, sections=22)
+        head = rod((-long, 0.8 * long), 0, 0, r, sections=22)
         if rng.random() < 0.6:
             head += box((-1.25 * long, 0.7 * long), 0.9 * r, (0.75 * r, 1.1 * r), fillet=0.1 * r)
         front, low = long, 1.3 * long + r
@@ -297,21 +297,21 @@ def _swivel(rng: Rng) -> Assembly:
         long = r * rng.uniform(0.9, 2.0)
         head = box(long, r, 0.8 * r, fillet=0.2 * r)
         front, low = long, 1.3 * long + r
-    head += cylinder((-0.8 * front, 0, 0), (-front - 0.12 * r, 0, 0), 0.6 * r, sections=20)
+    head += rod((-0.8 * front, -front - 0.12 * r), 0, 0, 0.6 * r, sections=20)
     head += ring((-front - 0.18 * r, 0, 0), FRONT, 0.45 * r, 0.6 * r, 0.16 * r, 20)
     sink = low + thick + 0.004
     fork = tube([(0, -reach - thick, 0), (0, -reach - thick, -0.6 * sink), (0, -0.5 * r, -sink), (0, 0.5 * r, -sink),
                  (0, reach + thick, -0.6 * sink), (0, reach + thick, 0)], thick, 10)  # fmt: skip
     neck = 0.3 * r
-    fork += cylinder((0, 0, -sink - thick), (0, 0, -sink), 2.2 * thick, sections=14)
+    fork += rod(0, 0, (-sink - thick, -sink), 2.2 * thick, sections=14)
     foot = -sink - thick - GAP
     kind = pick(rng, ["disc", "column", "clip"])
     if kind == "clip":
         base = box(0.8 * r, r, (foot - 0.01, foot)) + box((0.4 * r, -0.7 * r, foot - 2 * r), (0.6 * r, 0.7 * r, foot))
     else:
         tall = r * (rng.uniform(0.2, 0.5) if kind == "disc" else rng.uniform(1.0, 3.0))
-        base = cylinder((0, 0, foot - tall), (0, 0, foot), neck if kind == "column" else 1.1 * r, 0.9 * neck + 0.4 * r)
-        base += cylinder((0, 0, foot - tall - 0.2 * r), (0, 0, foot - tall + 1e-4), 1.3 * r, 1.2 * r)
+        base = rod(0, 0, (foot - tall, foot), neck if kind == "column" else 1.1 * r, 0.9 * neck + 0.4 * r)
+        base += rod(0, 0, (foot - tall - 0.2 * r, foot - tall + 1e-4), 1.3 * r, 1.2 * r)
     camera = Assembly("body", base, DENSITY)
     pan = rng.uniform(0.8, 3.0) if rng.random() < 0.5 else None
     camera.add("fork", fork, swivel("body", UP, (0, 0, foot), pan))

@@ -16,7 +16,7 @@ from artsim.families.wagons import hand_cart, wagon
 from artsim.families.wheels import GAP, STEEL, Wheels, bar
 from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
 from artsim.making.outlines import UP, about
-from artsim.making.solids import Solid, box, cylinder, hull_of, posts, tray, tube, union
+from artsim.making.solids import Solid, box, hull_of, posts, rod, tray, tube, union
 
 
 def build(rng: Rng) -> Assembly:
@@ -58,7 +58,7 @@ def _platform_trolley(rng: Rng) -> Assembly:
             handle += bar((x, -wide, lift + share * rise), (x, wide, lift + share * rise), 0.7 * r)
     cart = Assembly()
     if folds:
-        handle += cylinder((x, -wide, foot), (x, wide, foot), r, sections=12)
+        handle += rod(x, (-wide, wide), foot, r, sections=12)
         for s in (-1.0, 1.0):
             y0, y1 = sorted((s * (wide + r + 0.002), s * (wide + r + 0.006)))
             body += box((x - 1.5 * r, x + 1.5 * r), (y0, y1), (top - 0.004, foot + 1.5 * r))
@@ -101,7 +101,7 @@ def _hand_truck(rng: Rng) -> Assembly:
         body += tube([(x, y, 0.35 * height), (axle_x, y, wheels.radius + 0.02), (axle_x, y, wheels.radius)], 0.8 * r, 8)
         body += tube([(axle_x, y, wheels.radius), (x, y, 0.06)], 0.8 * r, 8)
     body += union(bar((x, -half, z), (x, half, z), 0.8 * r) for z in (0.06, 0.35 * height))
-    body += cylinder((axle_x, -inner, wheels.radius), (axle_x, inner, wheels.radius), 0.7 * r, sections=10)
+    body += rod(axle_x, (-inner, inner), wheels.radius, 0.7 * r, sections=10)
     folding = rng.random() < 0.45
     toe_x, toe = x - r - 0.006, rng.uniform(0.12, 0.3)
     wide = half * rng.uniform(0.9, 1.3)
@@ -113,7 +113,7 @@ def _hand_truck(rng: Rng) -> Assembly:
         body += top
     cart = Assembly("body", body, STEEL)
     if folding:
-        plate += cylinder((toe_x, -0.7 * half, 0.006), (toe_x, 0.7 * half, 0.006), 0.0058, sections=12)
+        plate += rod(toe_x, (-0.7 * half, 0.7 * half), 0.006, 0.0058, sections=12)
         turn = revolute("body", (0, 1, 0), (toe_x, 0, 0.006), 0.0, rng.uniform(1.2, 0.5 * np.pi))
         cart.add("toe_plate", plate, turn, label="plate")
     for s in (-1.0, 1.0):
@@ -136,7 +136,7 @@ def _truck_handle(rng: Rng, shape: str, x: float, half: float, height: float, r:
         arch = [(front, y * cos(a), top - 0.03 + 0.7 * y * sin(a)) for a in angles.tolist()]
         return legs + tube(arch, r, 8)
     if shape == "bar":
-        return legs + cylinder((front, -1.15 * y, top - 0.03), (front, 1.15 * y, top - 0.03), 1.4 * r, sections=12)
+        return legs + rod(front, (-1.15 * y, 1.15 * y), top - 0.03, 1.4 * r, sections=12)
     grips = union(tube([(front, s * y, top - 0.035), (front + 0.02, s * y, top), (front + 0.14, s * y, top + 0.02)],
                        1.2 * r, 8) for s in (-1.0, 1.0))  # fmt: skip
     return legs + grips + bar((front, -y, top - 0.06), (front, y, top - 0.06), 0.8 * r)

@@ -12,7 +12,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import SIDE, UP
-from artsim.making.solids import Solid, box, cylinder, frame, hull_of, ring, tube
+from artsim.making.solids import Solid, box, cylinder, frame, hull_of, ring, rod, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0025
@@ -36,14 +36,14 @@ def build(rng: Rng) -> Assembly:
 
     base = _star(rng, legs, span, floor, hub, column, piston, sleeve, castors)
     if not lifted:
-        base += cylinder((0, 0, hub - 0.01), (0, 0, seat_low - 0.002), column, sections=18)
+        base += rod(0, 0, (hub - 0.01, seat_low - 0.002), column, sections=18)
     chair = Assembly("base", base, 1500.0)
     chair.record(legs=True)
     if castors:
         _castors(rng, chair, legs, span, floor, wheel)
-    rod = cylinder((0, 0, sleeve - travel - 0.03), (0, 0, seat_low - 0.002), piston, sections=18)
+    stem = rod(0, 0, (sleeve - travel - 0.03, seat_low - 0.002), piston, sections=18)
     if lifted:
-        chair.add("piston", rod, prismatic("base", UP, 0.0, travel, (0, 0, sleeve)), density=4000.0)
+        chair.add("piston", stem, prismatic("base", UP, 0.0, travel, (0, 0, sleeve)), density=4000.0)
 
     depth, width = (rng.uniform(0.32, 0.4),) * 2 if stool else (rng.uniform(0.42, 0.5), rng.uniform(0.42, 0.52))
     thick = rng.uniform(0.04, 0.09)
@@ -123,11 +123,11 @@ def _star(
     """Legs around a column with a bore for the piston, or a disc."""
     low = floor + (0.004 if castors else 0.012)
     solid = ring((0, 0, 0.5 * (hub - 0.03 + sleeve)), UP, piston + GAP, column + 0.002, sleeve - hub + 0.03, 14)
-    solid += cylinder((0, 0, low), (0, 0, hub), 1.7 * column, 1.35 * column, 20)
+    solid += rod(0, 0, (low, hub), 1.7 * column, 1.35 * column, 20)
     if not legs:
         thick = rng.uniform(0.012, 0.03)
-        solid += cylinder((0, 0, 0), (0, 0, thick), 0.85 * span, 0.8 * span, 36)
-        return solid + cylinder((0, 0, thick - 0.002), (0, 0, hub), 0.5 * span, 1.35 * column, 24)
+        solid += rod(0, 0, (0, thick), 0.85 * span, 0.8 * span, 36)
+        return solid + rod(0, 0, (thick - 0.002, hub), 0.5 * span, 1.35 * column, 24)
     wide, narrow = rng.uniform(0.022, 0.03), rng.uniform(0.014, 0.02)
     slope = rng.uniform(0.0, 0.7)
     for k in range(legs):
@@ -136,7 +136,7 @@ def _star(
         tip = box((span - 0.02, span + 0.02), narrow, (low, tip_top), fillet=0.006)
         leg = hull_of(root, tip)
         if not castors:
-            leg += cylinder((span, 0, 0), (span, 0, low + 0.01), 0.9 * narrow, sections=14)
+            leg += rod(span, 0, (0, low + 0.01), 0.9 * narrow, sections=14)
         solid += leg.turned(UP, 2.0 * np.pi * (k + 0.5) / legs)
     return solid
 
@@ -149,27 +149,27 @@ def _castors(rng: Rng, chair: Assembly, legs: int, span: float, floor: float, wh
     for k in range(legs):
         angle = 2.0 * np.pi * (k + 0.5) / legs
         x, y = span * cos(angle), span * sin(angle)
-        fork = cylinder((0, 0, floor - 0.018), (0, 0, floor + 0.004 - GAP), 0.011, sections=14)
+        fork = rod(0, 0, (floor - 0.018, floor + 0.004 - GAP), 0.011, sections=14)
         fork += hull_of(
             box(0.009, gap, (floor - 0.02, floor - 0.01)),
-            cylinder((trail, -gap, wheel), (trail, gap, wheel), 0.5 * wheel, sections=14),
+            rod(trail, (-gap, gap), wheel, 0.5 * wheel, sections=14),
         )
         wheels = Solid()
         clear = GAP if rolling else -0.001
         for side in (-1.0, 1.0):
             y0, y1 = side * (gap + clear), side * (gap + clear + broad)
-            wheels += cylinder((trail, y0, wheel), (trail, y1, wheel), wheel, 0.93 * wheel, 14)
+            wheels += rod(trail, (y0, y1), wheel, wheel, 0.93 * wheel, 14)
         # Both wheels of a rolling pair sit on an axle through the fork, in a bore wider than it.
         if rolling:
             bore = 0.2 * wheel
-            fork = cylinder((0, 0, floor - 0.018), (0, 0, floor + 0.004 - GAP), 0.011, sections=14)
+            fork = rod(0, 0, (floor - 0.018, floor + 0.004 - GAP), 0.011, sections=14)
             fork += box(0.011, gap, (floor - 0.024, floor - 0.012))
             fork += ring((trail, 0, wheel), (0, 1, 0), bore + GAP, 0.62 * wheel, 2 * gap, 10)
             fork += hull_of(
                 box(0.009, gap, (floor - 0.02, floor - 0.012)),
                 box((trail - 0.35 * wheel, trail + 0.3 * wheel), gap, (1.42 * wheel, 1.5 * wheel)),
             )
-            wheels += cylinder((trail, -gap - 0.004, wheel), (trail, gap + 0.004, wheel), bore, sections=10)
+            wheels += rod(trail, (-gap - 0.004, gap + 0.004), wheel, bore, sections=10)
         pose = (x, y, 0.0)
         name = f"caster_{k}"
         if not rolling:
@@ -186,11 +186,11 @@ def _castors(rng: Rng, chair: Assembly, legs: int, span: float, floor: float, wh
 def _seat(rng: Rng, depth: float, width: float, thick: float, low: float, stool: bool) -> Solid:
     """Cushion on a plate."""
     z = low + 0.03
-    solid = box(0.1, 0.09, (low, z + 0.01)) + cylinder((0, 0, low), (0, 0, z), 0.06)
+    solid = box(0.1, 0.09, (low, z + 0.01)) + rod(0, 0, (low, z), 0.06)
     if stool and rng.random() < 0.7:
         r = 0.5 * depth
-        solid += cylinder((0, 0, z), (0, 0, z + 0.7 * thick), r, sections=32)
-        return solid + cylinder((0, 0, z + 0.69 * thick), (0, 0, z + thick), r, 0.88 * r, 32)
+        solid += rod(0, 0, (z, z + 0.7 * thick), r, sections=32)
+        return solid + rod(0, 0, (z + 0.69 * thick, z + thick), r, 0.88 * r, 32)
     corner = rng.uniform(0.05, 0.12)
     plan = box(0.5 * depth, 0.5 * width, (z, z + 0.65 * thick), fillet=corner, axis=2)
     a, b = 0.47 * depth, 0.46 * width
@@ -206,7 +206,7 @@ def _back(rng: Rng, width: float, top: float, hinge: Array, tilting: bool) -> So
     lean = rng.uniform(0.05, 0.2)
     x = hinge[0] + 0.025
     spine = 0.028
-    solid = cylinder((hinge[0], -spine, hinge[2]), (hinge[0], spine, hinge[2]), 0.012, sections=16)
+    solid = rod(hinge[0], (-spine, spine), hinge[2], 0.012, sections=16)
     path = np.array([[*hinge], [x + 0.02, 0, hinge[2] + 0.01], [x + 0.03, 0, low + 0.3 * tall]])
     solid += tube(path, 0.016, 10)
     corner = min(half, 0.5 * tall) * rng.uniform(0.2, 0.7)

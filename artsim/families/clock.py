@@ -16,7 +16,7 @@ from artsim.families.details import side_hinge
 from artsim.families.hanging_clocks import cuckoo_clock, pendulum_clock, wall_clock
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import FRONT, about
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull_of, prism, ring, tube, union
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull_of, prism, ring, rod, tube, union
 
 GAP = 0.001
 DENSITY = 500.0
@@ -42,7 +42,7 @@ def _mantel_clock(rng: Rng) -> Assembly:
     corners = np.array([(-half, low), (half, low)])
     if kind == "drum":
         low = -half * rng.uniform(1.05, 1.4)
-        body += cylinder((0.002, 0, 0), (deep, 0, 0), half, sections=32)
+        body += rod((0.002, deep), 0, 0, half, sections=32)
         for y in (-0.6 * half, 0.6 * half):
             body += box((0.1 * deep, 0.9 * deep), (y - 0.1 * half, y + 0.1 * half), (low, -0.6 * half))
     elif kind == "tambour":
@@ -73,7 +73,7 @@ def _mantel_clock(rng: Rng) -> Assembly:
     clock = Assembly()
     tilting = kind == "drum" and rng.random() < 0.4
     if tilting:  # the drum hangs in a fork
-        drum = dial_plate(rng, radius) + cylinder((0.002, 0, 0), (deep, 0, 0), half, sections=32)
+        drum = dial_plate(rng, radius) + rod((0.002, deep), 0, 0, half, sections=32)
         drum += rim(rng, 1.005 * radius, 0.08 * radius, 0.003 + 0.1 * radius)
         x, r = 0.5 * deep, 0.08 * half
         arm = half + 0.004 + 2 * r
@@ -99,7 +99,7 @@ def _knobs(rng: Rng, clock: Assembly, x: float, spread: float) -> None:
     for k in range(count):
         y, z = (k - 0.5 * (count - 1)) * spread, rng.uniform(-0.6, 0.3) * spread
         r = 0.35 * spread * rng.uniform(0.6, 1.0)
-        knob = cylinder((x + GAP, y, z), (x + GAP + 0.5 * r, y, z), 0.5 * r, sections=10)
+        knob = rod((x + GAP, x + GAP + 0.5 * r), y, z, 0.5 * r, sections=10)
         knob += box((x + GAP + 0.4 * r, x + GAP + 1.4 * r), about(y, r), about(z, 0.25 * r), fillet=0.2 * r)
         name = f"knob_{k}" if count > 1 else "knob"
         clock.add(name, knob, continuous("body", CLOCKWISE, (x, y, z)), density=DENSITY)
@@ -130,7 +130,7 @@ def _longcase_clock(rng: Rng) -> Assembly:
     body += box((-0.02, deep), 1.1 * hood, (hood - 0.02, hood + 0.02), fillet=0.01)
     if rng.random() < 0.5:
         for s in (-1.0, 1.0):
-            body += cylinder((-0.02, s * hood, low), (-0.02, s * hood, hood - 0.02), 0.012, sections=12)
+            body += rod(-0.02, s * hood, (low, hood - 0.02), 0.012, sections=12)
     body += box((-0.02, deep), 1.05 * hood, (low - 0.03, low + 0.002))
     body += frame((0.01, -trunk, bottom), (deep, trunk, low - 0.028), [0.02] * 4)
     body += box((deep - 0.012, deep), trunk - 0.01, (bottom + 0.01, low - 0.03))
@@ -163,7 +163,7 @@ def _alarm_clock(rng: Rng) -> Assembly:
         tall = rng.uniform(0.9, 1.3)
         kind = pick(rng, ["square", "wedge", "drum"])
         if kind == "drum":
-            body += cylinder((0.002, 0, 0), (deep, 0, 0), half, sections=32)
+            body += rod((0.002, deep), 0, 0, half, sections=32)
             body += box((0.1 * deep, 0.9 * deep), 0.7 * half, (-1.08 * half, -0.5 * half))
             top = half * cos(np.pi / 32)
         else:
@@ -182,7 +182,7 @@ def _alarm_clock(rng: Rng) -> Assembly:
         if kind != "wedge":
             _knobs(rng, clock, deep, 0.3 * radius)
         return clock
-    body += cylinder((0.002, 0, 0), (deep, 0, 0), half, sections=32)
+    body += rod((0.002, deep), 0, 0, half, sections=32)
     spread = rng.uniform(0.5, 0.75)
     r = 0.07 * radius
     size = radius * rng.uniform(0.38, 0.55)
@@ -210,8 +210,8 @@ def _alarm_clock(rng: Rng) -> Assembly:
         high = half * cos(spread) + 0.35 * size
         tip = max(high, z + 0.25 * size)
         head = min(0.35 * room, 0.1 * radius)
-        hammer = cylinder((middle, 0, z), (middle, 0, tip), 0.5 * head, sections=8)
-        hammer += cylinder((middle, -0.8 * head, tip), (middle, 0.8 * head, tip), head, sections=10)
+        hammer = rod(middle, 0, (z, tip), 0.5 * head, sections=8)
+        hammer += rod(middle, (-0.8 * head, 0.8 * head), tip, head, sections=10)
         limit = max(0.3 * (room - head) / (tip - z), 0.02)
         clock.add("hammer", hammer, revolute("body", FRONT, (middle, 0, z), -limit, limit), density=3000.0)
     _knobs(rng, clock, deep, 0.5 * radius)
@@ -225,13 +225,13 @@ def _watch(rng: Rng) -> Assembly:
     half = radius * rng.uniform(1.06, 1.18)
     rise = 0.16 * radius
     body = dial_plate(rng, radius)
-    body += cylinder((0.0015, 0, 0), (0.5 * deep, 0, 0), half, sections=30)
-    body += cylinder((0.5 * deep - 1e-4, 0, 0), (deep, 0, 0), half, 0.8 * half, 30)
+    body += rod((0.0015, 0.5 * deep), 0, 0, half, sections=30)
+    body += rod((0.5 * deep - 1e-4, deep), 0, 0, half, 0.8 * half, 30)
     body += ring((0.0015 - 0.5 * rise, 0, 0), FRONT, 1.005 * radius, half, rise, 28)
     neck = half + 0.12 * radius
-    body += cylinder((0.3 * deep, 0, 0.95 * half), (0.3 * deep, 0, neck), 0.1 * radius, sections=12)
+    body += rod(0.3 * deep, 0, (0.95 * half, neck), 0.1 * radius, sections=12)
     x = 0.3 * deep
-    crown = cylinder((x, 0, neck + 0.0004), (x, 0, neck + 0.22 * radius), 0.14 * radius, sections=14)
+    crown = rod(x, 0, (neck + 0.0004, neck + 0.22 * radius), 0.14 * radius, sections=14)
     bow = tube([(x, 0.34 * radius * cos(a), neck + 0.05 * radius + 0.42 * radius * sin(a))
                 for a in np.linspace(-0.6, np.pi + 0.6, 11).tolist()], 0.04 * radius, 8)  # fmt: skip
     fixed = rng.random() < 0.5
@@ -242,7 +242,7 @@ def _watch(rng: Rng) -> Assembly:
     front = add_hands(rng, clock, 0.9 * radius, "body")
     if rng.random() < 0.55:
         edge = min(front, 0.0015 - rise) - 0.0004
-        lid = cylinder((edge, 0, 0), (edge - 0.12 * radius, 0, 0), half, 0.85 * half, 30)
+        lid = rod((edge, edge - 0.12 * radius), 0, 0, half, 0.85 * half, 30)
         left = rng.random() < 0.5
         y = half * (1.0 if left else -1.0)
         clock.add("lid", lid, side_hinge(edge - 0.06 * radius, 1.02 * y, rng.uniform(1.2, 2.2), left))

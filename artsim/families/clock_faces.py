@@ -8,7 +8,7 @@ from artsim.common.elementary import cos, sin
 from artsim.families.details import side_hinge
 from artsim.making.assembly import Assembly, Rng, continuous, pick
 from artsim.making.outlines import FRONT, about
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull, hull_of, prism, revolved
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull, hull_of, prism, revolved, rod
 from artsim.model.kinematics import Array
 
 CLOCKWISE = np.array([1.0, 0.0, 0.0])
@@ -68,7 +68,7 @@ def add_hands(rng: Rng, clock: Assembly, radius: float, parent: str) -> float:
         w = wide * (0.3 if thin else 1.0 - 0.2 * number)
         tail = long * rng.choice([0.0, rng.uniform(0.1, 0.3)])
         low, high = x - gap - thick, x - gap
-        solid = cylinder((low, 0, 0), (high, 0, 0), hub * (1.0 - 0.2 * number), sections=14)
+        solid = rod((low, high), 0, 0, hub * (1.0 - 0.2 * number), sections=14)
         solid += _hand("bar" if thin else kind, low, high, w, long, tail)
         turned = solid.turned(CLOCKWISE, rng.uniform(0.0, 2.0 * np.pi))
         clock.add(name, turned, continuous(parent, CLOCKWISE, (low, 0, 0)), label="hand", density=2000.0)
@@ -100,7 +100,7 @@ def _hand(kind: str, low: float, high: float, wide: float, long: float, tail: fl
 
 def dial_plate(rng: Rng, radius: float) -> Solid:
     """A round plate whose front is the plane x = 0, with the marks of the hours."""
-    return cylinder((0, 0, 0), (0.004, 0, 0), radius, sections=32) + marks(rng, radius)
+    return rod((0, 0.004), 0, 0, radius, sections=32) + marks(rng, radius)
 
 
 def rim(rng: Rng, radius: float, wide: float, rise: float) -> Solid:
@@ -116,19 +116,19 @@ def pendulum(rng: Rng, x: float, top: float, length: float, room: float) -> tupl
     """A rod with a bob that hangs from height ``top``; and how far it may swing in a case of half width ``room``."""
     bob = min(length * rng.uniform(0.1, 0.22), 0.55 * room)
     z = top - length + bob
-    rod = max(0.008 * length, 0.0012)
-    solid = cylinder((x - 0.5 * rod, 0, top), (x - 0.5 * rod, 0, z), rod, sections=8)
+    thin = max(0.008 * length, 0.0012)
+    solid = rod(x - 0.5 * thin, 0, (top, z), thin, sections=8)
     kind = pick(rng, ["disc", "lens", "bar", "drop"])
     thick = max(0.12 * bob, 0.002)
     if kind == "disc":
-        solid += cylinder((x - thick, 0, z), (x + thick, 0, z), bob, sections=24)
+        solid += rod((x - thick, x + thick), 0, z, bob, sections=24)
     elif kind == "lens":
         solid += ellipsoid((x, 0, z), (1.5 * thick, bob, bob), 18)
     elif kind == "bar":
-        solid += cylinder((x, 0, z + bob), (x, 0, z - bob), max(0.35 * bob, rod), sections=14)
+        solid += rod(x, 0, (z + bob, z - bob), max(0.35 * bob, thin), sections=14)
     else:
         solid += hull_of(ellipsoid((x, 0, z - 0.3 * bob), (1.5 * thick, 0.7 * bob, 0.7 * bob), 14),
-                         box((x - rod, -rod, z), (x + rod, rod, z + bob)))  # fmt: skip
+                         box((x - thin, -thin, z), (x + thin, thin, z + bob)))  # fmt: skip
     swing = min(0.7 * (room - bob) / length, 0.45)
     return solid, max(swing, 0.03)
 

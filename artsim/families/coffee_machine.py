@@ -14,7 +14,7 @@ from artsim.common.elementary import power
 from artsim.families.details import dial
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import FRONT, about, lifted, rounded_rectangle
-from artsim.making.solids import Solid, box, cylinder, hull, hull_of, ring, tray, tube, union, vessel
+from artsim.making.solids import Solid, box, cylinder, hull, hull_of, ring, rod, tray, tube, union, vessel
 
 GAP = 0.0015
 
@@ -57,7 +57,7 @@ def _espresso(rng: Rng) -> Assembly:
         post, behind = 0.02, 0.1 * x if with_lid else x - 0.03
         corners = [(a, b * (y - 0.02)) for a, b in ((0.03 - x, -1), (0.03 - x, 1), (behind, 1), (behind, -1))]
         body += tube([(a, b, height + post) for a, b in corners], 0.0035, 8, closed=True)
-        body += union(cylinder((a, b, height - 0.003), (a, b, height + post), 0.003, sections=8) for a, b in corners)
+        body += union(rod(a, b, (height - 0.003, height + post), 0.003, sections=8) for a, b in corners)
 
     wand_side = float(rng.choice([-1.0, 1.0])) if rng.random() < 0.7 and y > 0.11 else 0.0
     group = np.array([-x + 0.5 * front, -0.25 * wand_side * y, head_low])
@@ -67,7 +67,7 @@ def _espresso(rng: Rng) -> Assembly:
 
     # The portafilter turns away from the wand.
     top = group[2] - 0.014 - GAP
-    basket = cylinder((group[0], group[1], top - 0.03), (group[0], group[1], top), 0.029, 0.034)
+    basket = rod(group[0], group[1], (top - 0.03, top), 0.029, 0.034)
     reach = rng.uniform(0.09, 0.13)
     neck = (group[0] - 0.03, group[1], top - 0.014)
     grip = (group[0] - 0.035 - reach, group[1], top - 0.022)
@@ -115,7 +115,7 @@ def _controls(rng: Rng, machine: Assembly, face: float, y: float, low: float, hi
             )
         else:
             size = min(rng.uniform(0.008, 0.012), room)
-            key = cylinder((face - 0.0032, center[1], z), (face - 0.011, center[1], z), size, 0.92 * size, 16)
+            key = rod((face - 0.0032, face - 0.011), center[1], z, size, 0.92 * size, 16)
             machine.add(f"button_{number}", key, prismatic("body", (1, 0, 0), 0.0, 0.0025, center), density=900.0)
 
 
@@ -144,7 +144,7 @@ def _drip(rng: Rng) -> Assembly:
     shrink = rng.choice([0.0, rng.uniform(0.0, 0.15)]) * y  # the head may narrow upward
     reach = center - 0.5 * pot if rng.random() < 0.3 else -x  # or end above the middle of the carafe
     body += _tapered((reach, -y), (x + 0.018, y), (head_low, height), radius, shrink)
-    body += cylinder((center, 0, base - 0.002), (center, 0, base + 0.003), 0.8 * pot)
+    body += rod(center, 0, (base - 0.002, base + 0.003), 0.8 * pot)
     if rng.random() < 0.5:  # gauge of the water tank
         body += box((x - 0.01, x + 0.004), (-y - 0.002, -y + 0.002), (base + 0.03, head_low - 0.02))
     plain = rng.random() < 0.35  # nothing but the lid moves
@@ -185,8 +185,8 @@ def _percolator(rng: Rng) -> Assembly:
         rings = [lifted(rounded_rectangle((-w, -w), (w, w), corner, 3), z) for w, z in levels]
         body = hull(np.concatenate(rings))
     else:
-        body = cylinder((0, 0, 0), (0, 0, foot), levels[0][0], levels[1][0])
-    body += cylinder((0, 0, foot - 0.002), (0, 0, foot + waist + 0.002), 0.95 * narrow, 0.85 * narrow)
+        body = rod(0, 0, (0, foot), levels[0][0], levels[1][0])
+    body += rod(0, 0, (foot - 0.002, foot + waist + 0.002), 0.95 * narrow, 0.85 * narrow)
     low, top = foot + waist, foot + waist + tall
     body += vessel([(narrow, low), (radius, top)], 0.004, sections=20)
     turn = float(rng.choice([0.5, -0.5, 0.0, 1.0])) * np.pi  # where the handle points
@@ -201,11 +201,11 @@ def _percolator(rng: Rng) -> Assembly:
     body += tube(np.array(grip), r, 10).turned((0, 0, 1), turn)
     machine = Assembly("body", body, 900.0)
     seam, rise = top + GAP, rng.uniform(0.006, 0.03)
-    lid = cylinder((0, 0, seam), (0, 0, seam + rise), radius + 0.003, rng.uniform(0.5, 1.0) * radius)
+    lid = rod(0, 0, (seam, seam + rise), radius + 0.003, rng.uniform(0.5, 1.0) * radius)
     knob_top = seam + rise + rng.uniform(0.008, 0.03)
-    lid += cylinder((0, 0, seam), (0, 0, knob_top), rng.uniform(0.15, 0.45) * radius, sections=16)
+    lid += rod(0, 0, (seam, knob_top), rng.uniform(0.15, 0.45) * radius, sections=16)
     if rng.random() < 0.75:
-        lid += cylinder((0, 0, seam - rng.uniform(0.004, 0.02)), (0, 0, seam + 0.001), 0.45 * radius, 0.75 * radius)
+        lid += rod(0, 0, (seam - rng.uniform(0.004, 0.02), seam + 0.001), 0.45 * radius, 0.75 * radius)
         joint = prismatic("body", (0, 0, 1), 0.0, rng.uniform(0.02, 0.8) * tall, (0, 0, seam))
     else:
         hinge = (radius + 0.004, 0.0, seam)
@@ -235,7 +235,7 @@ def _carafe(rng: Rng, center: float, pot: float, low: float, high: float) -> Sol
     profile = np.column_stack([radii, shares * (rise - lid)])
     solid = vessel(profile, 0.003, (center, 0, low), sections=24)
     top = low + rise - lid
-    solid += cylinder((center, 0, top - 0.002), (center, 0, top + lid - 0.001), radii[-1] - 0.001, 0.8 * radii[-1])
+    solid += rod(center, 0, (top - 0.002, top + lid - 0.001), radii[-1] - 0.001, 0.8 * radii[-1])
     solid += ring((center, 0, top - 0.02), (0, 0, 1), 0.95 * radii[3] - 0.004, radii[3] + 0.004, 0.014)
     grip = [(center - radii[3] + 0.002, 0, top - 0.016), (center - radii[3] - 0.04, 0, top - 0.012),
             (center - radii[3] - 0.055, 0, top - 0.03), (center - pot - 0.02, 0, low + 0.35 * rise),
@@ -253,9 +253,7 @@ def _pod(rng: Rng) -> Assembly:
     body = _base(x, y, base, radius, y - 0.01, front)
     body += box((-x + front, tank_x), y, (base - 0.002, height - 0.002), fillet=radius, axis=2)
     body += box((-x + 0.01, tank_x - 0.001), y, (height - head, height), fillet=1.5 * radius, axis=1)
-    body += cylinder(
-        (-x + 0.5 * front, 0, height - head - 0.018), (-x + 0.5 * front, 0, height - head + 0.002), 0.012, 0.02, 16
-    )
+    body += rod(-x + 0.5 * front, 0, (height - head - 0.018, height - head + 0.002), 0.012, 0.02, 16)
     machine = Assembly("body", body, 700.0)
     _drip_tray(rng, machine, -x - 0.001, front - 0.003, y - 0.01, 0.01, base)
     # The lever lies on the head and turns up about an axis above its back.
@@ -267,7 +265,7 @@ def _pod(rng: Rng) -> Assembly:
         arm = sorted((s * wide, s * (wide - 0.01)))
         deep = (pivot[0] - length, pivot[0] + 0.006)
         lever += box(deep, (arm[0], arm[1]), (height + GAP, height + GAP + thick), fillet=0.004)
-    lever += cylinder((pivot[0], -wide, height + 0.0075), (pivot[0], wide, height + 0.0075), 0.005, sections=12)
+    lever += rod(pivot[0], (-wide, wide), height + 0.0075, 0.005, sections=12)
     limit = np.deg2rad(rng.uniform(60.0, 105.0))
     turn = revolute("body", (0, 1, 0), (pivot[0], 0, height + 0.0075), 0.0, limit)
     machine.add("lever", lever, turn, density=900.0)
@@ -292,7 +290,7 @@ def _urn(rng: Rng) -> Assembly:
         body += box((back, 0.95 * x), 0.85 * y, (0.5 * foot, height - 0.5 * head), fillet=0.02, axis=2)
         body += box(x, y, (height - head, height), fillet=radius, axis=2, steps=5)
         spout = (0.5 * (back - x), 0.0, height - head)
-        body += cylinder((spout[0], 0, spout[2] - 0.02), (spout[0], 0, spout[2] + 0.002), 0.01, 0.015, 14)
+        body += rod(spout[0], 0, (spout[2] - 0.02, spout[2] + 0.002), 0.01, 0.015, 14)
     else:
         waist = rng.uniform(0.75, 1.0)
         low = box(x, y, (0, 0.12 * height), fillet=radius, axis=2, steps=5)
@@ -317,14 +315,14 @@ def _urn(rng: Rng) -> Assembly:
     if rng.random() < 0.75:
         grip = x * rng.uniform(0.08, 0.16)
         top = seam + rise
-        lid += cylinder((0, 0, top - 0.002), (0, 0, top + grip), 0.6 * grip, sections=14)
-        lid += cylinder((0, 0, top + 0.9 * grip), (0, 0, top + 1.8 * grip), 1.3 * grip, grip, 18)
+        lid += rod(0, 0, (top - 0.002, top + grip), 0.6 * grip, sections=14)
+        lid += rod(0, 0, (top + 0.9 * grip, top + 1.8 * grip), 1.3 * grip, grip, 18)
     if rng.random() < 0.65:
         joint = prismatic("body", (0, 0, 1), 0.0, height * power(12.0, rng.uniform(-1.0, -0.1)), (0, 0, seam))
     else:
         hinge, half = (side_x + 0.006, 0.0, seam + 0.002), 0.3 * side_y
         lid += box((side_x - 0.3 * x, hinge[0]), half, (seam, seam + 0.004))
-        lid += cylinder((hinge[0], -half, hinge[2]), (hinge[0], half, hinge[2]), 0.002, sections=10)
+        lid += rod(hinge[0], (-half, half), hinge[2], 0.002, sections=10)
         joint = revolute("body", (0, 1, 0), hinge, 0.0, np.deg2rad(rng.uniform(60.0, 110.0)))
     machine.add("lid", lid, joint)
     if niche and rng.random() < 0.6:

@@ -11,7 +11,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin, tan
 from artsim.making.assembly import Assembly, Rng, continuous, prismatic
 from artsim.making.outlines import rounded_rectangle
-from artsim.making.solids import Solid, box, cylinder, prism, union
+from artsim.making.solids import Solid, box, cylinder, prism, rod, union
 
 GAP = 0.0005
 
@@ -56,9 +56,9 @@ def build(rng: Rng) -> Assembly:
         cutter.add("cap", plug, prismatic("body", (1, 0, 0), 0.0, pull, (end, 0, 0.5 * height)), density=1000.0)
     if rng.random() < 0.25:
         at, radius = button_end - 0.5 * button, min(0.35 * button, 0.9 * half)
-        wheel = cylinder((at, 0, top + 0.001), (at, 0, top + 0.004), radius, sections=20)
+        wheel = rod(at, 0, (top + 0.001, top + 0.004), radius, sections=20)
         wheel += union(
-            cylinder((at + x, y, top + 0.001), (at + x, y, top + 0.0034), 0.14 * radius, sections=6)
+            rod(at + x, y, (top + 0.001, top + 0.0034), 0.14 * radius, sections=6)
             for x, y in ((radius * cos(a), radius * sin(a)) for a in np.arange(12) * np.pi / 6)
         )
         cutter.add("wheel", wheel, continuous("blade", (0, 0, 1), (at, 0, top)))

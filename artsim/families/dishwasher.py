@@ -14,7 +14,7 @@ import numpy as np
 from artsim.common.elementary import hypot
 from artsim.families.details import dial, flat_handle, front_handle, push_button, wire_shelf
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, posts, tray, union
+from artsim.making.solids import Solid, box, frame, posts, rod, tray, union
 
 GAP = 0.002
 
@@ -189,7 +189,7 @@ def _sliding_racks(rng: Rng, machine: Assembly, s: Shape) -> None:
     reach = min(0.5 * (back - front), half) - 0.02
     low = s.floor + 0.02
     arm = box((center - reach, center + reach), 0.025, (low, low + 0.015), fillet=0.02, axis=2)
-    arm += cylinder((center, 0, s.floor + GAP), (center, 0, low + 0.02), 0.03)
+    arm += rod(center, 0, (s.floor + GAP, low + 0.02), 0.03)
     machine.add("spray_arm", arm, continuous("body", (0, 0, 1), (center, 0, low)))
 
 
@@ -261,5 +261,5 @@ def _inside(rng: Rng, s: Shape) -> Solid:
     if s.liner > 0.01:
         y, z = rng.uniform(-0.2, 0.5) * half, low + rng.uniform(0.4, 0.7) * (high - low)
         solid += box((0, 0.8 * s.liner), (y - 0.06, y + 0.09), (z - 0.05, z + 0.05), fillet=0.006)
-        solid += cylinder((0, y - 0.12, z), (0.7 * s.liner, y - 0.12, z), 0.03)
+        solid += rod((0, 0.7 * s.liner), y - 0.12, z, 0.03)
     return solid

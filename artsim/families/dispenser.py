@@ -15,7 +15,7 @@ from artsim.families.details import front_handle, rounded_tray, side_hinge
 from artsim.families.vessels import GAP, Level, cap, cross_section, dome, moulded, neck, pump_head, ribs
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute, screw
 from artsim.making.outlines import UP, about, turns
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, rod, tube, union
 from artsim.model.kinematics import Array
 
 DENSITY = 400.0  # kg/m^3, as the pieces are solid and real ones are hollow
@@ -67,7 +67,7 @@ def _pump_bottle(rng: Rng) -> Assembly:
     turning = pick(rng, {"screw": 0.3, "turn": 0.4, "fixed": 0.3})
     if turning == "fixed":
         for y in places:
-            body += collar.moved((0, y, 0)) + cylinder((0, y, low - GAP), (0, y, low + wall), 0.99 * outer)
+            body += collar.moved((0, y, 0)) + rod(0, y, (low - GAP, low + wall), 0.99 * outer)
     dispenser = Assembly("body", body, DENSITY)
     for number, y in enumerate(places):
         parent, tail = "body", f"_{number}" if count > 1 else ""
@@ -116,7 +116,7 @@ def _soap_box(rng: Rng) -> Assembly:
     body += box((front - 0.004, depth - thick), 0.8 * half, (0.3 * low, low), fillet=0.006)
     body += box((front * 0.5, depth - thick - 0.01), 0.6 * half, (low - 0.006, low + 0.03))
     nozzle = front * 0.4
-    body += cylinder((nozzle, 0, 0.3 * low), (nozzle, 0, 0.12 * low), 0.008, 0.006, 14)
+    body += rod(nozzle, 0, (0.3 * low, 0.12 * low), 0.008, 0.006, 14)
     face = front - CLEAR
     cover = rounded_tray((face - thick, -half, low + 0.002 + CLEAR), (face, half, height), 0.003, radius,
                          ((0.0, rng.uniform(0.0, 0.25) * half), (0.35, 0.0), (1.0, 0.0)), axis=0, side=1)  # fmt: skip
@@ -142,7 +142,7 @@ def _soap_box(rng: Rng) -> Assembly:
             *(box((x - 0.003, -w, z - 0.003), (x + 0.003, w, z + 0.003), fillet=0.002)
               for (x, _, z), w in ((path[1], 0.006), (path[2], wide)))
         )  # fmt: skip
-        solid += cylinder((pivot[0], -0.4 * wide, pivot[2]), (pivot[0], 0.4 * wide, pivot[2]), r, sections=12)
+        solid += rod(pivot[0], (-0.4 * wide, 0.4 * wide), pivot[2], r, sections=12)
         dispenser.add("lever", solid, revolute("body", (0, -1, 0), pivot, 0.0, rng.uniform(0.1, 0.3)))
         return dispenser
     wide = half * rng.uniform(0.5, 0.78)
@@ -159,8 +159,7 @@ def _soap_box(rng: Rng) -> Assembly:
     r = min(0.45 * (top - bottom), 0.3 * half)
     for number, y in enumerate(spots):
         z = 0.5 * (top + bottom)
-        solid = cylinder((back, y, z), (back - 0.012, y, z), r) + cylinder((back - 0.011, y, z), (back - 0.016, y, z),
-                                                                           0.95 * r, 0.6 * r)  # fmt: skip
+        solid = rod((back, back - 0.012), y, z, r) + rod((back - 0.011, back - 0.016), y, z, 0.95 * r, 0.6 * r)
         name = f"button_{number}" if len(spots) > 1 else "button"
         dispenser.add(name, solid, prismatic("body", (1, 0, 0), 0.0, 0.01, (back, y, z)))
     return dispenser
@@ -196,20 +195,19 @@ def _drink_jar(rng: Rng) -> Assembly:
     out = -wide - reach
     rise = r * rng.uniform(1.3, 2.0)
     for y in spots:
-        body += cylinder((-0.4 * wide, y, z), (out, y, z), r, sections=16)
-        body += cylinder((out, y, z - 0.035), (out, y, z + rise), 1.15 * r, sections=16)
+        body += rod((-0.4 * wide, out), y, z, r, sections=16)
+        body += rod(out, y, (z - 0.035, z + rise), 1.15 * r, sections=16)
         body += ring((-0.985 * wide, y, z), (1, 0, 0), 0.5 * r, 1.9 * r, 0.01, 16)
     radius = mouth * half
-    lid = cylinder((0, 0, top + CLEAR), (0, 0, top + CLEAR + 0.012), radius * rng.uniform(0.95, 1.05), 0.93 * radius)
+    lid = rod(0, 0, (top + CLEAR, top + CLEAR + 0.012), radius * rng.uniform(0.95, 1.05), 0.93 * radius)
     lid += dome(0.9 * radius, top + CLEAR + 0.0115, radius * rng.uniform(0.05, 0.45))
     crown = float(lid.bounds()[1, 2])
     size = radius * rng.uniform(0.12, 0.2)
-    lid += cylinder((0, 0, crown - 0.004), (0, 0, crown + 0.6 * size), 0.5 * size) + ellipsoid((0, 0, crown + size),
-                                                                                            size, 12)  # fmt: skip
+    lid += rod(0, 0, (crown - 0.004, crown + 0.6 * size), 0.5 * size) + ellipsoid((0, 0, crown + size), size, 12)
     hinged = rng.random() < 0.3
     if hinged:
         x, w = 1.05 * radius + 0.006, 0.3 * radius
-        lid += cylinder((x, -w, top + CLEAR + 0.004), (x, w, top + CLEAR + 0.004), 0.004, sections=12)
+        lid += rod(x, (-w, w), top + CLEAR + 0.004, 0.004, sections=12)
         lid += box((0.8 * radius, x), w, (top + CLEAR, top + CLEAR + 0.004))
     dispenser = Assembly("body", body, DENSITY)
     if hinged:
@@ -251,10 +249,10 @@ def _stand(rng: Rng, wide: float, foot: float) -> Solid:
     """Legs with a ring, a pedestal, or a plinth."""
     kind = pick(rng, ["legs", "pedestal", "plinth"])
     if kind == "plinth":
-        return cylinder((0, 0, 0), (0, 0, foot + 0.002), wide * rng.uniform(0.9, 1.05), 0.9 * wide)
+        return rod(0, 0, (0, foot + 0.002), wide * rng.uniform(0.9, 1.05), 0.9 * wide)
     if kind == "pedestal":
-        stem = cylinder((0, 0, 0.01), (0, 0, foot + 0.002), 0.3 * wide, 0.6 * wide)
-        return stem + cylinder((0, 0, 0), (0, 0, 0.015), wide, 0.85 * wide)
+        stem = rod(0, 0, (0.01, foot + 0.002), 0.3 * wide, 0.6 * wide)
+        return stem + rod(0, 0, (0, 0.015), wide, 0.85 * wide)
     solid = ring((0, 0, foot - 0.006), UP, 0.75 * wide, 1.0 * wide, 0.016, 20)
     count = int(rng.integers(3, 5))
     spread = rng.uniform(0.9, 1.25)
@@ -294,12 +292,12 @@ def _water_cooler(rng: Rng) -> Assembly:
     z = roof - (0.075 if style == "tap" else 0.02)
     for number, y in enumerate(spots):
         nose = niche - 0.045
-        body += cylinder((niche + 0.005, y, z), (nose, y, z), 0.01, sections=14)
-        body += cylinder((nose, y, z + 0.01), (nose, y, z - 0.03), 0.009, sections=14)
+        body += rod((niche + 0.005, nose), y, z, 0.01, sections=14)
+        body += rod(nose, y, (z + 0.01, z - 0.03), 0.009, sections=14)
         if style == "lever":  # a paddle below the tap, which the cup pushes back
             pivot = (niche - 0.012, y, z - 0.04)
             tap = box((pivot[0] - 0.003, pivot[0] + 0.003), (y - 0.02, y + 0.02), (z - 0.11, z - 0.045))
-            tap += cylinder((pivot[0], y - 0.012, pivot[2]), (pivot[0], y + 0.012, pivot[2]), 0.006, sections=12)
+            tap += rod(pivot[0], (y - 0.012, y + 0.012), pivot[2], 0.006, sections=12)
             joint = revolute("body", (0, -1, 0), pivot, 0.0, 0.09)
         elif style == "tap":
             tap, joint = _tap_handle("flip", np.array([nose, y, z + 0.011]), 0.009, 0.03, rng)

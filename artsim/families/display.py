@@ -15,7 +15,7 @@ from artsim.families.keys import Face, add_key, front_face, key_outline
 from artsim.families.screens import Panel, draw_panel, screen
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import FRONT, UP, rounded_rectangle
-from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, ring, tube
+from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, ring, rod, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -51,7 +51,7 @@ def _foot(rng: Rng, half: float, depth: float, thick: float) -> Solid:
     back = 0.45 * depth
     front = back - depth
     if kind == "disc":
-        return cylinder((0, 0, 0), (0, 0, thick), 0.5 * depth, 0.5 * depth * rng.uniform(0.7, 1.0), 32)
+        return rod(0, 0, (0, thick), 0.5 * depth, 0.5 * depth * rng.uniform(0.7, 1.0), 32)
     if kind == "legs":  # two legs that spread to the front
         width = rng.uniform(0.02, 0.05)
         solid = box((-0.3 * back, back), 1.5 * width, (0, thick))
@@ -120,7 +120,7 @@ def _on_stand(rng: Rng, display: Assembly) -> None:
         turn = rng.uniform(0.35, 1.57)
         foot += GAP
         chain.part("neck", revolute("base", (0, 0, 1), (0, 0, foot), -turn, turn))
-        chain.solid = cylinder((0, 0, foot), (0, 0, foot + 0.006), rng.uniform(1.6, 2.4) * radius, sections=24)
+        chain.solid = rod(0, 0, (foot, foot + 0.006), rng.uniform(1.6, 2.4) * radius, sections=24)
     chain.solid += _column(rng, radius, foot + (0.004 if swivels else -0.004), top, not slides)
     if slides:
         travel = (top - middle) * rng.uniform(0.5, 0.9) + rng.uniform(0.0, half_sleeve)
@@ -137,7 +137,7 @@ def _on_stand(rng: Rng, display: Assembly) -> None:
     for y in offsets:
         chain.solid += box((axis, front + 0.004), (y - ear, y + ear), (middle - 0.8 * knuckle, middle + 0.8 * knuckle))
         if tilts:
-            chain.solid += cylinder((axis, y - ear, middle), (axis, y + ear, middle), knuckle, sections=14)
+            chain.solid += rod(axis, (y - ear, y + ear), middle, knuckle, sections=14)
     parent = chain.name
     if count > 1:
         chain.finish()
@@ -169,7 +169,7 @@ def _column(rng: Rng, radius: float, low: float, high: float, free: bool) -> Sol
     """The upright of a stand; a square one, unless its shape is free."""
     kind = pick(rng, ["square", "round", "wide", "tapered"]) if free else "square"
     if kind == "round":
-        return cylinder((0, 0, low), (0, 0, high), radius, sections=20)
+        return rod(0, 0, (low, high), radius, sections=20)
     wide = radius * {"square": 1.0, "wide": rng.uniform(1.5, 4.0), "tapered": 1.0}[kind]
     foot = wide * (rng.uniform(1.2, 4.0) if kind == "tapered" else 1.0)
     deep = radius if not free else radius * rng.uniform(0.5, 1.0)
@@ -180,7 +180,7 @@ def _column(rng: Rng, radius: float, low: float, high: float, free: bool) -> Sol
 
 def _head(
     plane: float, axis: float, y: float, z: float, ear: float, knuckle: float, panel: Panel, tilts: bool
-) -> Solid:  # fmt: skip
+) -> Solid:
     """What holds a screen: a plate behind it, and ears on either side of the hinge, or an arm where nothing tilts."""
     size = min(0.045, 0.5 * panel.rise)
     solid = box((plane, plane + 0.006), (y - 0.8 * size, y + 0.8 * size), (z - size, z + size))
@@ -188,7 +188,7 @@ def _head(
         return solid + box((plane, axis + 0.001), (y - ear, y + ear), (z - 0.8 * knuckle, z + 0.8 * knuckle))
     for s in (-1.0, 1.0):
         first, last = sorted((y + s * (ear + 0.001), y + s * (ear + 0.006)))
-        solid += cylinder((axis, first, z), (axis, last, z), knuckle, sections=14)
+        solid += rod(axis, (first, last), z, knuckle, sections=14)
         solid += box((plane, axis), (first, last), (z - 0.8 * knuckle, z + 0.8 * knuckle))
     return solid
 
@@ -230,7 +230,7 @@ def _on_feet(rng: Rng, display: Assembly) -> None:
     x = -0.5 * panel.thick
     spread = panel.half * rng.uniform(0.45, 0.85)
     reach = min(panel.half * rng.uniform(0.2, 0.5), 0.8 * spread)
-    wide, rod = rng.uniform(0.006, 0.03), min(0.3 * panel.thick, 0.012)
+    wide, leg = rng.uniform(0.006, 0.03), min(0.3 * panel.thick, 0.012)
     limit = rng.uniform(0.8, 1.57)
     for k, s in enumerate((-1.0, 1.0)):
         y = s * spread
@@ -238,10 +238,10 @@ def _on_feet(rng: Rng, display: Assembly) -> None:
         if rng.random() < 0.5:
             levels = ((0.8, 0.004), (0.3, foot))
             solid += hull(
-                [(x + a * r * reach * 0.9, y + b * rod, z) for a in (-1, 1) for b in (-1, 1) for r, z in levels]
+                [(x + a * r * reach * 0.9, y + b * leg, z) for a in (-1, 1) for b in (-1, 1) for r, z in levels]
             )
         else:
-            solid += cylinder((x, y, 0.004), (x, y, foot), rod, sections=14)
+            solid += rod(x, y, (0.004, foot), leg, sections=14)
         display.add(f"foot_{k}", solid, revolute("body", (0, 0, s), (x, y, foot), 0.0, limit), density=2000.0)
 
 
@@ -258,7 +258,7 @@ def _on_easel(rng: Rng, display: Assembly) -> None:
     for k in range(count):
         y = 0.0 if count == 1 else (k - 0.5) * 1.2 * panel.half
         leaf = box((GAP, GAP + thick), (y - wide, y + wide), (low, z))
-        leaf += cylinder((GAP + 0.5 * thick, y - wide, z), (GAP + 0.5 * thick, y + wide, z), 0.5 * thick, sections=12)
+        leaf += rod(GAP + 0.5 * thick, (y - wide, y + wide), z, 0.5 * thick, sections=12)
         hinge = revolute("body", (0, -1, 0), (GAP + 0.5 * thick, y, z), 0.0, rng.uniform(0.5, 1.6))
         display.add("stand" if count == 1 else f"leg_{k}", leaf, hinge, density=1500.0)
 
@@ -276,16 +276,16 @@ def _tube(rng: Rng, display: Assembly) -> None:
         chain.solid = _foot(rng, 0.6 * half, rng.uniform(0.8, 1.3) * half, thick)
         turn = rng.uniform(0.5, 1.57)
         chain.part("screen", revolute("base", (0, 0, 1), (0, 0, thick), -turn, turn))
-        chain.solid = cylinder((0, 0, thick + GAP), (0, 0, foot + 0.004), 0.35 * half, 0.5 * half, 24)
+        chain.solid = rod(0, 0, (thick + GAP, foot + 0.004), 0.35 * half, 0.5 * half, 24)
     else:
         chain.name = "body"
         splay = rng.uniform(1.0, 1.3)
-        rod = rng.uniform(0.008, 0.02)
+        leg = rng.uniform(0.008, 0.02)
         x0 = -0.5 * cabinet
         for a, s in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
             tip = (x0 + a * splay * 0.4 * cabinet, s * splay * 0.75 * half, 0.0)
             head = (x0 + a * 0.4 * cabinet, s * 0.75 * half, foot + 0.003)
-            chain.solid += cylinder(tip, head, 0.7 * rod, rod, 12)
+            chain.solid += cylinder(tip, head, 0.7 * leg, leg, 12)
     front = -0.5 * cabinet - 0.2 * depth if swivels else -cabinet
     low, high = foot, foot + 2.0 * rise
     rim = rng.uniform(0.06, 0.16) * half
@@ -326,8 +326,8 @@ def _rabbit_ears(rng: Rng, display: Assembly, parent: str, foot: Array, half: fl
     for k, s in enumerate((-1.0, 1.0)):
         pivot = foot + (0.0, s * 0.05, 0.012)
         tip = pivot + length * np.array([0.0, s * float(sin(lean)), float(cos(lean))])
-        rod = tube([pivot, tip], [0.003, 0.0018], 8) + cylinder(
+        ear = tube([pivot, tip], [0.003, 0.0018], 8) + cylinder(
             pivot - (0.007, 0, 0), pivot + (0.007, 0, 0), 0.008, sections=12
         )
         hinge = revolute(parent, (s, 0, 0), tuple(pivot), -rng.uniform(0.3, 0.8), lean * 0.8)
-        display.add(f"antenna_{k}", rod, hinge, density=3000.0)
+        display.add(f"antenna_{k}", ear, hinge, density=3000.0)

@@ -16,7 +16,7 @@ from artsim.common.elementary import cos, sin
 from artsim.families.details import bar_handle, grid_panel, swing_limits
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull, ring, tube, union
+from artsim.making.solids import Solid, box, ellipsoid, frame, hull, ring, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.004
@@ -241,7 +241,7 @@ def _knuckles(low: Array, high: Array, edge: float, side: float) -> Solid:
     solid = Solid()
     for share in (0.12, 0.5, 0.88):
         z = low[2] + share * (high[2] - low[2])
-        solid += cylinder((x, y, z - 0.045), (x, y, z + 0.045), 0.0055, sections=12)
+        solid += rod(x, y, (z - 0.045, z + 0.045), 0.0055, sections=12)
         solid += box((x, low[0] + 0.001), (y - 0.003, y + 0.003), (z - 0.045, z + 0.045))
     return solid
 
@@ -265,7 +265,7 @@ def _turning_handle(
     """Lever or knob on both sides of a leaf, on one spindle through it."""
     y, z = center
     out = 0.045
-    handle = cylinder((front - out, y, z), (back + out, y, z), 0.0085, sections=12)
+    handle = rod((front - out, back + out), y, z, 0.0085, sections=12)
     if kind == "knob":
         width, tall = rng.uniform(0.024, 0.032), rng.uniform(0.02, 0.032)
         handle += union(ellipsoid((x, y, z), (0.02, width, tall)) for x in (front - out - 0.01, back + out + 0.01))

@@ -16,7 +16,7 @@ from artsim.families.details import front_handle, knob, panel
 from artsim.families.proportions import unusual_sides, with_tails
 from artsim.making.assembly import Assembly, Rng, pick, prismatic
 from artsim.making.outlines import FRONT, Vector
-from artsim.making.solids import Solid, box, cylinder, frame, hull_of, tray, tube, union
+from artsim.making.solids import Solid, box, frame, hull_of, rod, tray, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -323,7 +323,7 @@ def _legs(rng: Rng, x0: float, x1: float, y: float, height: float, size: float) 
             if kind == "square":
                 solid += box((x - half, x + half), (w - half, w + half), (0, height))
             elif kind == "round":
-                solid += cylinder((x, w, 0), (x, w, height), half * taper, half, 16)
+                solid += rod(x, w, (0, height), half * taper, half, 16)
             elif kind == "tapered":  # below a straight block, its outer faces upright
                 block = box((x - half, x + half), (w - half, w + half), (0.75 * height, height))
                 foot = taper * half

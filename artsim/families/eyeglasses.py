@@ -16,7 +16,7 @@ from artsim.common.elementary import arcsin, cos, hypot, power, sin
 from artsim.common.products import norm
 from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.outlines import about
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, loft, tube, union
+from artsim.making.solids import Solid, box, ellipsoid, hull, hull_of, loft, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0006
@@ -293,7 +293,7 @@ def _hinge(front: Front) -> tuple[Solid, Solid]:
 
     def knuckle(low: float, high: float, x0: float, x1: float) -> Solid:
         leaf = box((x0, x1), (-0.3 * b, b + 0.8 * MM), (low, high))
-        return cylinder((0, 0, low), (0, 0, high), 0.9 * b, sections=12) + leaf
+        return rod(0, 0, (low, high), 0.9 * b, sections=12) + leaf
 
     fixed = knuckle(third, half, -3.0 * MM, -GAP) + knuckle(-half, -third, -3.0 * MM, -GAP)
     return fixed, knuckle(-third + 0.3 * MM, third - 0.3 * MM, GAP, 3.0 * MM)

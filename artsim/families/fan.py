@@ -14,7 +14,7 @@ from artsim.common.elementary import cos, sin
 from artsim.common.products import norm
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import FRONT, UP, circle
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, loft, ring, tube, union
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, loft, ring, rod, tube, union
 
 GAP = 0.002
 
@@ -38,14 +38,14 @@ def _head_fan(rng: Rng) -> Assembly:
     if sliding:
         sleeve = height * rng.uniform(0.5, 0.65)
         wide = 1.45 * column
-        base += cylinder((0, 0, 0.005), (0, 0, 0.04), wide, sections=20)
+        base += rod(0, 0, (0.005, 0.04), wide, sections=20)
         base += ring((0, 0, 0.5 * (0.02 + sleeve)), UP, column + GAP, wide, sleeve - 0.02, 16)
         base += ring((0, 0, sleeve - 0.02), UP, column + GAP, 1.25 * wide, 0.05, 16)
         deep = rng.uniform(0.4, 0.8) * (sleeve - 0.06)
-        pole = cylinder((0, 0, sleeve - deep), (0, 0, height), column, sections=18)
+        pole = rod(0, 0, (sleeve - deep, height), column, sections=18)
         stages = [("base", base, None), ("pole", pole, prismatic("", UP, 0.0, 0.75 * deep, (0, 0, sleeve)))]
     else:
-        base += cylinder((0, 0, 0.005), (0, 0, height), column * (1.0 if standing else 1.5), column, 20)
+        base += rod(0, 0, (0.005, height), column * (1.0 if standing else 1.5), column, 20)
         stages = [("base", base, None)]
     swing = np.deg2rad(rng.uniform(30, 75))
     turn = revolute("", UP, (0, 0, height), -swing, swing) if swings else None
@@ -57,7 +57,7 @@ def _head_fan(rng: Rng) -> Assembly:
     nod = revolute("", (0, 1, 0), (0, 0, level), -down, np.deg2rad(rng.uniform(15, 35))) if tilts else None
     stages.append(("head", head, nod))
     blades = _blades(rng, cage, 2.0 * abs(middle - back)).moved((middle, 0, level))
-    blades += cylinder((middle, 0, level), (back - GAP, 0, level), 0.03 * cage, sections=10)
+    blades += rod((middle, back - GAP), 0, level, 0.03 * cage, sections=10)
     stages.append(("blades", blades, continuous("", FRONT, (middle, 0, level))))
     return _stacked(stages)
 
@@ -88,12 +88,12 @@ def _steepest(cage: float, back: float, middle: float, column: float) -> float:
 def _neck(column: float, motor: float, z: float, level: float, side: float) -> Solid:
     """A knuckle with two cheeks that carry the motor."""
     cheek = 0.01
-    solid = cylinder((0, 0, z), (0, 0, z + 0.014), 1.4 * column, sections=18)
+    solid = rod(0, 0, (z, z + 0.014), 1.4 * column, sections=18)
     solid += box(column, side + cheek, (z + 0.004, z + 0.014))
     for s in (-1, 1):
         y0, y1 = sorted((s * side, s * (side + cheek)))
         solid += box(0.9 * column, (y0, y1), (z + 0.005, level))
-        solid += cylinder((0, y0, level), (0, y1, level), 1.1 * column, sections=18)
+        solid += rod(0, (y0, y1), level, 1.1 * column, sections=18)
     return solid
 
 
@@ -102,9 +102,9 @@ def _head(rng: Rng, cage: float, motor: float, level: float, pins: float, back: 
     half = cage * rng.uniform(0.17, 0.26)
     middle = back - half
     wide = 0.75 * motor
-    solid = cylinder((back, 0, 0), (0.6 * motor, 0, 0), wide)
-    solid += cylinder((0.59 * motor, 0, 0), (0.85 * motor, 0, 0), wide, 0.6 * wide)
-    solid += cylinder((0, -pins, 0), (0, pins, 0), 0.35 * motor, sections=16)
+    solid = rod((back, 0.6 * motor), 0, 0, wide)
+    solid += rod((0.59 * motor, 0.85 * motor), 0, 0, wide, 0.6 * wide)
+    solid += rod(0, (-pins, pins), 0, 0.35 * motor, sections=16)
     solid += _cage(rng, cage, half, wide, int(rng.integers(10, 17))).moved((middle, 0, 0))
     return solid.moved((0, 0, level)), middle
 
@@ -114,7 +114,7 @@ def _cage(rng: Rng, cage: float, half: float, motor: float, wires: int) -> Solid
     wire = max(0.009 * cage, 0.0016)
     solid = tube(circle((0, 0, 0), FRONT, cage, 24), 2.2 * wire, 8, closed=True)
     badge = cage * rng.uniform(0.14, 0.26)
-    solid += cylinder((-half - 1.5 * wire, 0, 0), (-half + wire, 0, 0), 0.85 * badge, badge)
+    solid += rod((-half - 1.5 * wire, -half + wire), 0, 0, 0.85 * badge, badge)
     for sign, hub in ((-1.0, 0.85 * badge), (1.0, 0.8 * motor)):
         shares = rng.uniform(0.82, 0.9)
         for spot in circle((0, 0, 0), FRONT, 1.0, wires):
@@ -129,7 +129,7 @@ def _blades(rng: Rng, cage: float, depth: float) -> Solid:
     count = int(rng.integers(3, 7))
     hub, tip = cage * rng.uniform(0.13, 0.2), cage * rng.uniform(0.78, 0.86)
     reach = 0.2 * depth
-    solid = cylinder((-reach, 0, 0), (reach, 0, 0), 0.85 * hub, hub)
+    solid = rod((-reach, reach), 0, 0, 0.85 * hub, hub)
     broad = rng.uniform(0.45, 0.75) * 2.0 * np.pi / count
     sweep = rng.uniform(-0.5, 0.5)
     shares = np.array([0.0, 0.35, 0.75, 1.0])
@@ -171,14 +171,14 @@ def _box_fan(rng: Rng) -> Assembly:
             base += box((x - 0.8 * bar, x + 0.8 * bar), outer - 0.5 * wall, (z - bar, z + bar))
     motor = 0.25 * cage
     back = half - 0.35 * half
-    base += cylinder((back, 0, 0), (half - bar, 0, 0), motor)
-    base += cylinder((-half + bar, 0, 0), (-half - 0.002, 0, 0), 0.16 * cage)
+    base += rod((back, half - bar), 0, 0, motor)
+    base += rod((-half + bar, -half - 0.002), 0, 0, 0.16 * cage)
     corner = np.array([-half, outer - 0.035, outer - 0.035])
     with_knob = rng.random() < 0.5
     if with_knob:
         base += box(corner - (0, 0.03, 0.03), corner + (half, 0.03, 0.03), fillet=0.006, axis=0)
     fan = Assembly("base", base, 500.0)
-    blades = _blades(rng, cage, 1.5 * half) + cylinder((0, 0, 0), (back - GAP, 0, 0), 0.03 * cage, sections=10)
+    blades = _blades(rng, cage, 1.5 * half) + rod((0, back - GAP), 0, 0, 0.03 * cage, sections=10)
     fan.add("blades", blades, continuous("base", FRONT, (0, 0, 0)), density=1200.0)
     if with_knob:
         at = corner + GAP * FRONT
@@ -192,11 +192,11 @@ def _ceiling_fan(rng: Rng) -> Assembly:
     """Long paddles under a ceiling at z = 0, by chance with a lamp below."""
     reach, drop = rng.uniform(0.45, 0.75), rng.uniform(0.12, 0.4)
     count, body = int(rng.integers(3, 7)), rng.uniform(0.08, 0.13)
-    mount = cylinder((0, 0, -0.05), (0, 0, 0), 0.045, 0.07) + cylinder((0, 0, -drop), (0, 0, -0.02), 0.013, sections=14)
+    mount = rod(0, 0, (-0.05, 0), 0.045, 0.07) + rod(0, 0, (-drop, -0.02), 0.013, sections=14)
     low = -drop - GAP
     tall = body * rng.uniform(0.7, 1.2)
-    rotor = cylinder((0, 0, low - 0.25 * tall), (0, 0, low), body, 0.5 * body, 28)
-    rotor += cylinder((0, 0, low - tall), (0, 0, low - 0.24 * tall), 0.9 * body, body, 28)
+    rotor = rod(0, 0, (low - 0.25 * tall, low), body, 0.5 * body, 28)
+    rotor += rod(0, 0, (low - tall, low - 0.24 * tall), 0.9 * body, body, 28)
     if rng.random() < 0.6:
         rotor += ellipsoid((0, 0, low - tall), (0.75 * body, 0.75 * body, body * rng.uniform(0.4, 0.8)), 20)
     half, z = rng.uniform(0.05, 0.08), low - 0.6 * tall
@@ -220,6 +220,4 @@ def _foot(rng: Rng, cage: float, standing: bool) -> Solid:
     if rng.random() < 0.25:
         return box(0.8 * wide, 0.8 * wide, (0, 0.03), fillet=0.25 * wide, axis=2)
     tall = rng.uniform(0.015, 0.03)
-    return cylinder((0, 0, 0), (0, 0, tall), wide, 0.9 * wide, 32) + cylinder(
-        (0, 0, tall - 0.001), (0, 0, 2 * tall), 0.85 * wide, 0.3 * wide, 28
-    )
+    return rod(0, 0, (0, tall), wide, 0.9 * wide, 32) + rod(0, 0, (tall - 0.001, 2 * tall), 0.85 * wide, 0.3 * wide, 28)

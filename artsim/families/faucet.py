@@ -14,7 +14,7 @@ from artsim.common.products import unit
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, Rng, pick, revolute, screw, swivel
 from artsim.making.outlines import FRONT, UP
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, tube, union
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.001
@@ -74,7 +74,7 @@ def _kitchen_mixer(rng: Rng) -> Assembly:
     stem = radius * rng.uniform(1.15, 1.6)
     hub = radius * rng.uniform(0.6, 0.85)
     hub = min(hub, level - 0.012, top - level - 0.002)
-    body += cylinder((0, 0, level), (0, side * stem, level), hub, sections=20)
+    body += rod(0, (0, side * stem), level, hub, sections=20)
     length = with_tails(rng, (0.05, 0.09), (0.05, 0.15), 0.2)
     # A turning spout passes over the lever, wherever that points.
     lowest = level + 1.2 * length + 0.02
@@ -108,11 +108,11 @@ def _three_piece(rng: Rng) -> Assembly:
     base = box(half, spread + half, (0, plate), fillet=half, axis=2, steps=5)
     taper = rng.uniform(0.45, 0.9)
     for y in (-spread, spread):
-        base += cylinder((0, y, 0.5 * plate), (0, y, foot_height), foot_radius, taper * foot_radius)
-        base += cylinder((0, y, 0.5 * plate), (0, y, plate + 0.004), 1.1 * foot_radius)
+        base += rod(0, y, (0.5 * plate, foot_height), foot_radius, taper * foot_radius)
+        base += rod(0, y, (0.5 * plate, plate + 0.004), 1.1 * foot_radius)
     r = foot_radius * rng.uniform(0.4, 0.6)
     column = foot_height * rng.uniform(0.6, 1.3) + 0.01
-    base += cylinder((0, 0, 0.5 * plate), (0, 0, column), foot_radius, max(taper * foot_radius, 1.2 * r))
+    base += rod(0, 0, (0.5 * plate, column), foot_radius, max(taper * foot_radius, 1.2 * r))
     reach = with_tails(rng, (0.1, 0.18), (0.06, 0.35), 0.25)
     length = min(rng.uniform(0.05, 0.08), spread - foot_radius - 0.012)
     tip = foot_height + 0.06 + with_tails(rng, (0.0, 0.06), (0.0, 0.3), 0.2)
@@ -146,7 +146,7 @@ def _pillar_tap(rng: Rng) -> Assembly:
     body += tube(path, (np.linspace(1.0, 0.8, 8) * r).tolist(), 14) + _nozzle(
         rng, path[-1] + (0, 0, 0.004), -UP, 0.95 * r, r
     )
-    body += cylinder((0, 0, top - 0.002), (0, 0, top + 0.02), 0.45 * radius, sections=16)
+    body += rod(0, 0, (top - 0.002, top + 0.02), 0.45 * radius, sections=16)
     tap = Assembly("base", body, BRASS)
     pivot = np.array([0.0, 0.0, top + 0.02])
     knob = _knob(rng, pivot, UP, radius * rng.uniform(1.2, 1.7))
@@ -162,9 +162,9 @@ def _wall_tap(rng: Rng) -> Assembly:
     wall = radius + rng.uniform(0.02, 0.05)
     for y in (-0.6 * half, 0.6 * half):
         body += tube([(0, y, 0), (wall, y, 0)], 0.8 * radius, 16)
-        body += cylinder((wall - 0.006, y, 0), (wall + 0.004, y, 0), 1.5 * radius, sections=24)
+        body += rod((wall - 0.006, wall + 0.004), y, 0, 1.5 * radius, sections=24)
     drop = radius + rng.uniform(0.008, 0.02)
-    body += cylinder((0, 0, 0), (0, 0, -drop), 0.85 * radius, sections=20)
+    body += rod(0, 0, (0, -drop), 0.85 * radius, sections=20)
     reach, r = with_tails(rng, (0.12, 0.2), (0.05, 0.75), 0.4), 0.6 * radius
     s = np.linspace(0.0, 0.5 * np.pi, 6)
     bend = 2.2 * r
@@ -194,11 +194,11 @@ def _body(rng: Rng, radius: float, height: float) -> tuple[Solid, float]:
         solid = box(s, s, (0, height), fillet=0.25 * s, axis=2)
         return solid + box(foot, foot, (0, thick), fillet=0.3 * s, axis=2), height
     low = radius * (rng.uniform(1.05, 1.35) if kind == "tapered" else 1.0)
-    solid = cylinder((0, 0, 0), (0, 0, height), low, radius) + cylinder((0, 0, 0), (0, 0, thick), 1.1 * foot, foot)
+    solid = rod(0, 0, (0, height), low, radius) + rod(0, 0, (0, thick), 1.1 * foot, foot)
     if kind == "turned":
         for level in rng.uniform(0.12, 0.9, 3) * height:
             h = 0.1 * radius
-            solid += cylinder((0, 0, level - h), (0, 0, level + h), radius * rng.uniform(1.05, 1.2))
+            solid += rod(0, 0, (level - h, level + h), radius * rng.uniform(1.05, 1.2))
     return solid, height
 
 
@@ -221,7 +221,7 @@ def _gooseneck(rng: Rng, foot: Array, r: float, reach: float, tip: float) -> Sol
             points.append((reach, tip))
     path = np.array([(-x, 0.0, z) for x, z in points])
     ending = path[-1] - path[-2]
-    solid = tube(path, r, 14) + cylinder((0, 0, z0), (0, 0, z0 + 1.2 * r), 1.35 * r, 1.15 * r, 20)
+    solid = tube(path, r, 14) + rod(0, 0, (z0, z0 + 1.2 * r), 1.35 * r, 1.15 * r, 20)
     return solid + _nozzle(rng, path[-1] - 0.3 * ending, ending, 1.15 * r, 1.2 * r)
 
 

@@ -15,7 +15,7 @@ from artsim.common.elementary import arctan2, cos, hypot, sin
 from artsim.common.products import norm, unit
 from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.outlines import SIDE, Vector
-from artsim.making.solids import Solid, box, cylinder, frame, hull, union
+from artsim.making.solids import Solid, box, cylinder, frame, hull, rod, union
 from artsim.model.kinematics import Array
 
 GAP = 0.004
@@ -42,7 +42,7 @@ class _Bar:
         """A stretcher along Y."""
         size = min(self.thick, self.deep)
         if self.round:
-            return cylinder((x, -half, z), (x, half, z), 0.9 * size, sections=12)
+            return rod(x, (-half, half), z, 0.9 * size, sections=12)
         return box((x - size, x + size), half, (z - size, z + size))
 
 
@@ -256,7 +256,7 @@ def _tip_up(rng: Rng) -> Assembly:
             rng, np.array([x0, a + GAP + 0.008, seat_z]), np.array([hinge_x + 0.01, b - GAP - 0.008, seat_z + thick]), 0
         )
         at = (hinge_x, 0.5 * (a + b), seat_z + 0.5 * thick)
-        seat += cylinder((at[0], a + GAP, at[2]), (at[0], b - GAP, at[2]), 0.012, sections=12)
+        seat += rod(at[0], (a + GAP, b - GAP), at[2], 0.012, sections=12)
         room = x1 + 0.01 - hinge_x
         limit = np.pi / 2 - max(0.0, (0.5 * thick + 0.006 - room)) / 0.1 - 0.05
         joint = revolute("frame", SIDE, at, 0.0, min(limit, 1.45) * rng.uniform(0.9, 1.0))

@@ -11,7 +11,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, power, sin
 from artsim.making.assembly import Assembly, Rng, pick, revolute
-from artsim.making.solids import Solid, box, cylinder, loft, prism, union
+from artsim.making.solids import Solid, box, loft, prism, rod, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
@@ -138,7 +138,7 @@ def _details(rng: Rng, outline: Array, pins: Array, top: float) -> Solid:
     radius = rng.uniform(0.0012, 0.0025)
     for face, outward in ((0.0, -1), (top, 1)):
         for px, py in pins:
-            solid += cylinder((px, py, face - outward * 0.001), (px, py, face + outward * 0.0005), radius, sections=12)
+            solid += rod(px, py, (face - outward * 0.001, face + outward * 0.0005), radius, sections=12)
     kind = pick(rng, ["none", "bolster", "badge", "clip"])
     if kind == "bolster":
         shown = outline[:, outline[0, :, 0] < pins[0, 0] + rng.uniform(0.05, 0.2) * half] * 0.97

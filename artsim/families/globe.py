@@ -14,7 +14,7 @@ from artsim.common.elementary import cos, sin
 from artsim.common.products import apply, unit
 from artsim.making.assembly import Assembly, Rng, continuous, revolute
 from artsim.making.outlines import UP, rotation_about, turns
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, revolved, ring, tube, union
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, revolved, ring, rod, tube, union
 
 GAP = 0.0015
 
@@ -43,7 +43,7 @@ def build(rng: Rng) -> Assembly:
     if horizon:
         stand += _horizon(rng, arc_radius + 1.6 * thick, foot, thick, radius)
     if turning:
-        stub = cylinder((0, 0, foot), (0, 0, foot + 2.3 * thick), 0.9 * thick, sections=16)
+        stub = rod(0, 0, (foot, foot + 2.3 * thick), 0.9 * thick, sections=16)
         globe.add("stand", stand)
         if rng.random() < 0.5:
             joint = continuous("stand", UP, (0, 0, foot))
@@ -109,7 +109,7 @@ def _stand(rng: Rng, radius: float, top: float, thick: float) -> Solid:
     height = radius * rng.uniform(0.15, 0.9)
     low = top - height
     stem = thick * rng.uniform(0.9, 1.3)
-    solid = cylinder((0, 0, low), (0, 0, top), stem, sections=18)
+    solid = rod(0, 0, (low, top), stem, sections=18)
     if rng.random() < 0.5:
         z = low + rng.uniform(0.3, 0.7) * height
         solid += ellipsoid((0, 0, z), (1.8 * stem, 1.8 * stem, 0.14 * height), 16)
@@ -127,11 +127,11 @@ def _stand(rng: Rng, radius: float, top: float, thick: float) -> Solid:
     tall = radius * rng.uniform(0.06, 0.14)
     if kind == "plinth":
         return solid + box(wide, wide, (low - tall, low + 0.002), fillet=0.1 * wide, axis=2)
-    solid += cylinder((0, 0, low - tall), (0, 0, low + 0.002), wide, 0.9 * wide, 32)
+    solid += rod(0, 0, (low - tall, low + 0.002), wide, 0.9 * wide, 32)
     if kind == "stepped":
-        solid += cylinder((0, 0, low), (0, 0, low + 0.7 * tall), 0.65 * wide, 0.55 * wide, 28)
+        solid += rod(0, 0, (low, low + 0.7 * tall), 0.65 * wide, 0.55 * wide, 28)
     elif kind == "dome":
-        solid += cylinder((0, 0, low), (0, 0, low + 0.3 * height), 0.88 * wide, 1.2 * stem, 28)
+        solid += rod(0, 0, (low, low + 0.3 * height), 0.88 * wide, 1.2 * stem, 28)
     return solid
 
 

@@ -9,7 +9,7 @@ from artsim.families.clock_faces import add_hands, dial_plate, glass_door, outli
 from artsim.families.details import side_hinge
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import FRONT
-from artsim.making.solids import box, cylinder, ellipsoid, frame, hull_of, prism, tube
+from artsim.making.solids import box, ellipsoid, frame, hull_of, prism, rod, tube
 
 GAP = 0.001
 DENSITY = 500.0
@@ -24,7 +24,7 @@ def wall_clock(rng: Rng) -> Assembly:
     edge = rng.uniform(1.04, 1.35)
     body = dial_plate(rng, radius)
     if kind == "rays":
-        body += cylinder((0.002, 0, 0), (deep, 0, 0), 1.02 * radius, sections=32)
+        body += rod((0.002, deep), 0, 0, 1.02 * radius, sections=32)
         count, reach = int(rng.integers(6, 17)), rng.uniform(1.35, 2.0)
         r = radius * rng.uniform(0.02, 0.05)
         for k in range(count):
@@ -44,7 +44,7 @@ def wall_clock(rng: Rng) -> Assembly:
     clock = Assembly("body", body, DENSITY)
     add_hands(rng, clock, 0.95 * radius, "body")
     if rng.random() < 0.15 and deep > 0.02:
-        knob = cylinder((0.5 * deep, 0, 0), (0.5 * deep, 0, 0.012), 0.3 * deep, sections=14)
+        knob = rod(0.5 * deep, 0, (0, 0.012), 0.3 * deep, sections=14)
         lift = max(outline(kind if kind != "rays" else "round", 1.2 * edge * radius, tall)[:, 1]) + GAP
         if kind != "rays":
             clock.add("knob", knob.moved((0, 0, lift)), continuous("body", (0, 0, 1), (0.5 * deep, 0, lift)))
@@ -136,8 +136,8 @@ def cuckoo_clock(rng: Rng) -> Assembly:
         for number, y in enumerate((-0.35 * half, 0.35 * half)):
             drop = length * rng.uniform(0.6, 1.6)
             r = 0.14 * radius
-            weight = cylinder((x, y, low - GAP), (x, y, low - drop), 0.001, sections=6)
-            weight += hull_of(cylinder((x, y, low - drop), (x, y, low - drop - 3 * r), r, 0.5 * r, 10),
+            weight = rod(x, y, (low - GAP, low - drop), 0.001, sections=6)
+            weight += hull_of(rod(x, y, (low - drop, low - drop - 3 * r), r, 0.5 * r, 10),
                               ellipsoid((x, y, low - drop - 0.5 * r), r, 10))  # fmt: skip
             fall = prismatic("body", (0, 0, -1), 0.0, rng.uniform(0.05, 0.2), (x, y, low))
             clock.add(f"weight_{number}", weight, fall, density=4000.0)

@@ -17,7 +17,7 @@ from artsim.common.products import unit
 from artsim.families.vessels import Level, cross_section, dome, grip_loop, moulded
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute, screw
 from artsim.making.outlines import UP
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, ring, tube
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, ring, rod, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -174,7 +174,7 @@ def _lid(rng: Rng, pot: Pot, joint: str, low: bool) -> tuple[Solid, float]:
     z = pot.top + GAP
     radius = pot.mouth * rng.uniform(0.9, 1.04)
     rim = rng.uniform(0.003, 0.01)
-    lid = cylinder((0, 0, z), (0, 0, z + rim), radius, rng.uniform(0.92, 1.0) * radius)
+    lid = rod(0, 0, (z, z + rim), radius, rng.uniform(0.92, 1.0) * radius)
     rise = radius * rng.choice([0.06, rng.uniform(0.1, 0.5)])
     share = rng.uniform(0.8, 0.92)
     lid += dome(share * radius, z + rim - 0.0005, rise)
@@ -183,11 +183,11 @@ def _lid(rng: Rng, pot: Pot, joint: str, low: bool) -> tuple[Solid, float]:
     kind = pick(rng, ["ball", "mushroom", "ring", "bar", "cone"])
     foot = top - 0.15 * rise - 0.001
     if kind == "ball":
-        lid += cylinder((0, 0, foot), (0, 0, top + 0.5 * size), 0.4 * size) + ellipsoid((0, 0, top + size), size, 14)
+        lid += rod(0, 0, (foot, top + 0.5 * size), 0.4 * size) + ellipsoid((0, 0, top + size), size, 14)
         top += 2.0 * size
     elif kind == "mushroom":
-        lid += cylinder((0, 0, foot), (0, 0, top + 0.7 * size), 0.45 * size, 0.6 * size)
-        lid += cylinder((0, 0, top + 0.6 * size), (0, 0, top + size), 1.2 * size, size)
+        lid += rod(0, 0, (foot, top + 0.7 * size), 0.45 * size, 0.6 * size)
+        lid += rod(0, 0, (top + 0.6 * size, top + size), 1.2 * size, size)
         top += size
     elif kind == "ring":
         angles = np.linspace(-0.3, np.pi + 0.3, 9)
@@ -200,11 +200,11 @@ def _lid(rng: Rng, pot: Pot, joint: str, low: bool) -> tuple[Solid, float]:
         lid += box(0.35 * size, half, (foot - 0.3 * rise, top + 0.7 * size), fillet=0.2 * size)
         top += 0.7 * size
     else:
-        lid += cylinder((0, 0, foot), (0, 0, top + 1.2 * size), 0.5 * size, size, 16)
+        lid += rod(0, 0, (foot, top + 1.2 * size), 0.5 * size, size, 16)
         top += 1.2 * size
     if joint == "hinge":
         x, half, r = _hinge(pot)
-        lid += cylinder((x, -half, z + r), (x, half, z + r), r, sections=14)
+        lid += rod(x, (-half, half), z + r, r, sections=14)
         lid += box((0.8 * radius, x), half, (z, z + r))
     elif rng.random() < 0.5:  # a rim that reaches into the pot is hidden while the lid lies: only a plate shows
         lid += ring((0, 0, z + 0.5 * rim), UP, 0.9 * radius, 1.03 * radius, 0.6 * rim, 24)
@@ -224,7 +224,7 @@ def _lugs(pot: Pot) -> Solid:
     solid = Solid()
     for s in (-1.0, 1.0):
         y0, y1 = sorted((s * (half + 0.001), s * (half + 0.007)))
-        solid += hull_of(cylinder((x, y0, z), (x, y1, z), r, sections=12),
+        solid += hull_of(rod(x, (y0, y1), z, r, sections=12),
                          box((0.85 * pot.mouth, y0, pot.top - 0.02), (x + 0.5 * r, y1, pot.top - 0.012)))  # fmt: skip
     return solid
 
@@ -281,9 +281,9 @@ class Pins:
 def _pins(rng: Rng, pot: Pot, room: float) -> Pins:
     z = pot.foot + rng.uniform(0.6, 0.9) * (pot.top - pot.foot)
     widest = max(level[2] for level in pot.levels)
-    rod = rng.uniform(0.003, 0.006)
+    wire = rng.uniform(0.003, 0.006)
     # So wide and so high that it passes around the body wherever it stands.
-    return Pins(widest + rod + 0.004, z, max(room + 2.4 * rod, z + 1.2 * widest + 2.4 * rod) + 0.01, rod)
+    return Pins(widest + wire + 0.004, z, max(room + 2.4 * wire, z + 1.2 * widest + 2.4 * wire) + 0.01, wire)
 
 
 def _swinging_bow(rng: Rng, kettle: Assembly, pins: Pins, pot: Pot) -> None:
@@ -331,8 +331,7 @@ def _base(rng: Rng, kettle: Assembly, pot: Pot) -> None:
     """The stand below an electric kettle: it turns, or the kettle lifts off it."""
     radius = pot.levels[0][1] * rng.uniform(0.98, 1.25)
     tall = pot.foot - GAP
-    base = cylinder((0, 0, 0), (0, 0, 0.55 * tall), radius) + cylinder((0, 0, 0.5 * tall), (0, 0, tall), radius,
-                                                                     0.85 * radius)  # fmt: skip
+    base = rod(0, 0, (0, 0.55 * tall), radius) + rod(0, 0, (0.5 * tall, tall), radius, 0.85 * radius)
     if rng.random() < 0.5:
         base += box((radius * 0.5, 1.35 * radius), 0.3 * radius, (0.0, 0.6 * tall), fillet=0.004)
     at = np.array([0.0, 0.0, tall])

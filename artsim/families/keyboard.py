@@ -27,7 +27,7 @@ from artsim.families.key_layouts import (
 from artsim.families.keys import CLEAR, Face, key, key_outline, press, top_face
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import rounded_rectangle
-from artsim.making.solids import Solid, box, cylinder, hull, tube, union
+from artsim.making.solids import Solid, box, hull, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
@@ -185,7 +185,7 @@ def _trimmings(rng: Rng, face: Face, low: Array, high: Array, level: float) -> S
         radius = rng.uniform(0.006, 0.012)
         half = 0.5 * (high[0] - low[0]) * rng.uniform(0.7, 1.0)
         at = (back[0] + 0.6 * radius, max(float(back[2]) - radius, radius))
-        solid += cylinder((at[0], -half, at[1]), (at[0], half, at[1]), radius, sections=18)
+        solid += rod(at[0], (-half, half), at[1], radius, sections=18)
     return solid
 
 
@@ -223,7 +223,7 @@ def _feet(rng: Rng, keyboard: Assembly, low: Array, high: Array, room: float) ->
     for k, share in enumerate((-0.33, 0.33)):
         y = -0.5 * (low[0] + high[0]) + share * (high[0] - low[0])
         solid = box((x - length, x), (y - 0.5 * wide, y + 0.5 * wide), (GAP, GAP + thick))
-        solid += cylinder((x, y - 0.5 * wide, z), (x, y + 0.5 * wide, z), 0.5 * thick, sections=10)
+        solid += rod(x, (y - 0.5 * wide, y + 0.5 * wide), z, 0.5 * thick, sections=10)
         keyboard.add(f"foot_{k}", solid, revolute("body", (0, -1, 0), (x, y, z), 0.0, limit), density=1000.0)
 
 
@@ -262,7 +262,7 @@ def _pivot(rng: Rng, keyboard: Assembly, caps: _Caps) -> None:
             fillet=rng.uniform(0.003, 0.02), axis=2)  # fmt: skip
         # One half's disc lies on the other's, each joined to its own half by an arm.
         low, high = (0.0, 0.45 * thick) if side > 0 else (0.45 * thick + GAP, thick)
-        body += cylinder((pivot[0], 0, low), (pivot[0], 0, high), radius, sections=20)
+        body += rod(pivot[0], 0, (low, high), radius, sections=20)
         arm = sorted((side * (gap + 0.2 * radius), side * (gap + 1.6 * radius)))
         body += box((half[1] - 0.003, pivot[0] + 0.3 * radius), (arm[0], arm[1]), (low, high))
         bodies.append((body, face))
@@ -287,7 +287,7 @@ def _folding(rng: Rng, keyboard: Assembly, caps: _Caps) -> None:
         shares = (-0.9, -0.5, 0.5, 0.9) if side > 0 else (-0.49, -0.2, 0.2, 0.49)
         for first, last in ((shares[0], shares[1]), (shares[2], shares[3])):
             x0, x1 = first * half[1], last * half[1]
-            body += cylinder((x0, 0, axis), (x1, 0, axis), radius, sections=12)
+            body += rod((x0, x1), 0, axis, radius, sections=12)
             near, far = side * 0.2 * radius, side * (radius + 0.3 * margin)
             body += hull([(x, y, z) for x in (x0, x1) for y, z in ((near, axis - 0.9 * radius), (near, axis),
                           (far, 0.5 * thick), (far, thick), (near + side * 0.5 * radius, 0.3 * thick))])  # fmt: skip

@@ -12,7 +12,7 @@ from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import bow_handle, knob
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, ring, tube, union, vessel
+from artsim.making.solids import Solid, box, cylinder, hull_of, ring, rod, tube, union, vessel
 from artsim.model.kinematics import Array
 
 GAP = 0.0012
@@ -31,7 +31,7 @@ def build(rng: Rng) -> Assembly:
         pot += ring((0, 0, height - 0.0015), (0, 0, 1), radius - wall, radius + rng.uniform(0.0015, 0.004), 0.003, 24)
     if rng.random() < 0.3:  # thick base
         foot = profile[0, 0] + 0.001
-        pot += cylinder((0, 0, -0.005), (0, 0, 0.003), foot, sections=24)
+        pot += rod(0, 0, (-0.005, 0.003), foot, sections=24)
     hinged = rng.random() < 0.2
     pot += _handles(rng, radius, height, hinged)
     mouth = float(np.interp(height - 0.009, profile[:, 1], profile[:, 0])) - wall  # clear radius where a lid dips in
@@ -44,12 +44,10 @@ def build(rng: Rng) -> Assembly:
         x, z = lid_radius + 1.6 * r, height + GAP + r
         half = rng.uniform(0.012, 0.025)
         arm = box((lid_radius - 0.012, x), half, (height + GAP, height + GAP + 0.9 * r))
-        lid += arm + cylinder((x, -half, z), (x, half, z), r, sections=16)
+        lid += arm + rod(x, (-half, half), z, r, sections=16)
         for side in (-1, 1):  # lugs on the pot, either side of the barrel
             y0, y1 = sorted((side * (half + GAP), side * (half + GAP + 0.006)))
-            lug = hull_of(
-                cylinder((x, y0, z), (x, y1, z), r, sections=16), box((x - r, x + r), (y0, y1), (height - 0.02, height))
-            )
+            lug = hull_of(rod(x, (y0, y1), z, r, sections=16), box((x - r, x + r), (y0, y1), (height - 0.02, height)))
             pot += lug + box((radius - wall, x), (y0, y1), (height - 0.02, height - 0.008))
         assembly.add("pot", pot)
         joint = revolute("pot", (0, 1, 0), (x, 0, z), 0.0, np.deg2rad(rng.uniform(80, 105)))
@@ -129,12 +127,12 @@ def _lid(rng: Rng, radius: float, height: float, wall: float, mouth: float, hing
     lid_radius = radius + with_tails(rng, (-0.5 * wall, 0.004), (-0.5 * wall, 0.01), 0.2)
     z = height + GAP
     rim = rng.uniform(0.003, 0.008)
-    solid = cylinder((0, 0, z), (0, 0, z + rim), lid_radius, sections=24)
+    solid = rod(0, 0, (z, z + rim), lid_radius, sections=24)
     dome = lid_radius * rng.choice([0.03, rng.uniform(0.08, 0.5)])
     spread = rng.uniform(0.86, 0.99)
     heights, shares = np.array([0.0, 0.45, 0.75, 0.93, 1.0]), np.array([1.0, 0.86, 0.66, 0.42, 0.15])
     low = z + rim - 0.0005
-    discs = [cylinder((0, 0, low), (0, 0, low + dome * h + 1e-4), spread * lid_radius * s, sections=24)
+    discs = [rod(0, 0, (low, low + dome * h + 1e-4), spread * lid_radius * s, sections=24)
              for h, s in zip(heights, shares, strict=True)]  # fmt: skip
     solid += hull_of(*discs)
     if not hinged and rng.random() < 0.6:  # a rim that dips into the pot

@@ -17,7 +17,7 @@ from artsim.families.clearance import Link, narrow_limits
 from artsim.families.standing_lamp import spotlight, standing
 from artsim.making.assembly import Assembly, Rng, continuous, pick, revolute
 from artsim.making.outlines import SIDE, UP, rotation_about
-from artsim.making.solids import box, cylinder, ellipsoid, hull_of, revolved, tube, union
+from artsim.making.solids import box, cylinder, ellipsoid, hull_of, revolved, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.001
@@ -100,7 +100,7 @@ def _base(rng: Rng, link: Link, r: float) -> float:
         link.solid += box((-0.06, 0.035), 0.025, 0.012, fillet=0.004)
         link.solid += box((0.02, 0.035), 0.025, (-0.09, 0.0)) + box((-0.04, 0.03), 0.02, (-0.09, -0.078))
         link.solid += tube([(-0.02, 0, -0.11), (-0.02, 0, -0.045)], 0.006, 12)
-        link.solid += cylinder((-0.02, 0, -0.05), (-0.02, 0, -0.042), 0.014, sections=16)
+        link.solid += rod(-0.02, 0, (-0.05, -0.042), 0.014, sections=16)
         link.solid += box((-0.04, 0.0), 0.004, (-0.114, -0.106))
         link.guard((-0.02, 0, -0.12), (-0.02, 0, 0.03), 0.05)
         link.guard((-0.08, 0, 0), (0.05, 0, 0), 0.03)
@@ -108,15 +108,15 @@ def _base(rng: Rng, link: Link, r: float) -> float:
     elif kind == "square":
         link.solid += box(wide, 0.8 * wide, (0, thick), fillet=0.25 * wide, axis=2)
     else:
-        link.solid += cylinder((0, 0, 0), (0, 0, thick), wide, 0.95 * wide, 36)
+        link.solid += rod(0, 0, (0, thick), wide, 0.95 * wide, 36)
         if kind == "dome":
-            link.solid += cylinder((0, 0, thick - 0.001), (0, 0, thick + 0.015), 0.9 * wide, 0.3 * wide, 32)
+            link.solid += rod(0, 0, (thick - 0.001, thick + 0.015), 0.9 * wide, 0.3 * wide, 32)
     if kind != "clamp":
         for angle in np.arange(8) * np.pi / 4.0:  # a rim of rods guards the disc
             out = np.array([cos(angle), sin(angle), 0.0])
             link.guard((0, 0, 0.5 * thick), wide * 1.1 * out + (0, 0, 0.5 * thick), 0.5 * thick)
     post = rng.uniform(0.02, 0.045)
-    link.solid += cylinder((0, 0, 0.002), (0, 0, thick + post), 1.25 * r)
+    link.solid += rod(0, 0, (0.002, thick + post), 1.25 * r)
     link.guard((0, 0, 0.002), (0, 0, thick + post - 0.7 * r), 1.25 * r)
     return thick + post
 
@@ -128,11 +128,11 @@ def _arm(
     end = at + length * along
     link.solid += cylinder(at - half * SIDE, at + half * SIDE, r, sections=18)
     across = np.cross(SIDE, along)
-    rod = 0.8 * half
+    thin = 0.8 * half
     if double:
-        link.solid += union(tube([at + s * r * across, end + s * r * across], 0.75 * rod, 10) for s in (-0.6, 0.6))
+        link.solid += union(tube([at + s * r * across, end + s * r * across], 0.75 * thin, 10) for s in (-0.6, 0.6))
     else:
-        link.solid += tube([at, end], rod, 12)
+        link.solid += tube([at, end], thin, 12)
     if sprung:
         low, high = at + 0.15 * length * along, at + 0.4 * length * along
         coils = np.linspace(0.0, 1.0, 11)

@@ -14,7 +14,7 @@ import numpy as np
 
 from artsim.common.elementary import tan
 from artsim.making.assembly import Assembly, Rng, pick, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, hull_of, posts
+from artsim.making.solids import Solid, box, frame, hull_of, posts, rod
 
 GAP = 0.0008
 
@@ -137,7 +137,7 @@ def _propped(rng: Rng, shape: _Shape) -> Solid:
     radius = 0.5 * drop * rng.uniform(0.7, 1.1)
     x, z = back - radius, height - 0.0015 - radius
     end = half - rng.uniform(0.0, 0.1) * shape.width
-    return plate.turned((0, 1, 0), -shape.tilt, (back, 0, height)) + cylinder((x, -end, z), (x, end, z), radius)
+    return plate.turned((0, 1, 0), -shape.tilt, (back, 0, height)) + rod(x, (-end, end), z, radius)
 
 
 def _keyboard(rng: Rng, shape: _Shape, deck: float, rim: float) -> Solid:
@@ -196,7 +196,7 @@ def _lid(rng: Rng, shape: _Shape) -> Solid:
     if badge < 0.35:
         radius = shape.width * rng.uniform(0.03, 0.07)
         x = middle + rng.uniform(-0.1, 0.1) * shape.depth
-        solid += cylinder((x, 0, top - 0.0015), (x, 0, top + 0.0006), radius)
+        solid += rod(x, 0, (top - 0.0015, top + 0.0006), radius)
     elif badge < 0.5:
         long, wide = shape.width * rng.uniform(0.05, 0.12), shape.width * rng.uniform(0.02, 0.05)
         solid += box((middle - wide, middle + wide), long, (top - 0.0015, top + 0.0007), fillet=0.01, axis=2)
@@ -216,7 +216,7 @@ def _hinges(rng: Rng, shape: _Shape) -> Solid:
     solid = Solid()
     for first, last in spans:
         right, left = first * shape.width, last * shape.width
-        solid += cylinder((x, right, z), (x, left, z), radius, sections=16)
+        solid += rod(x, (right, left), z, radius, sections=16)
         upright = (arm + 0.0004, arm + max(min(0.8 * shape.lid, radius), 0.0015))
         solid += box((shape.back - 0.012, x), (right, left), upright)
     return solid

@@ -11,7 +11,7 @@ import numpy as np
 from artsim.common.elementary import arctan2, cos, sin
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import about, lifted, superellipse
-from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, ring, tube, union
+from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, ring, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
@@ -39,7 +39,7 @@ def _fork(center: Array, inner: float, thick: float, low: float, radius: float) 
     for side in (-1, 1):
         y0, y1 = sorted((side * inner, side * (inner + thick)))
         cheeks += hull_of(
-            cylinder((center[0], y0, center[2]), (center[0], y1, center[2]), radius, sections=12),
+            rod(center[0], (y0, y1), center[2], radius, sections=12),
             box((center[0] - radius, center[0] + radius), (y0, y1), (low, low + 0.001)),
         )
     return cheeks
@@ -77,14 +77,12 @@ def _pocket(rng: Rng) -> Assembly:
     chimney_high = height + (lid_tall - wall) * rng.uniform(0.5, 0.85)
     x0, x1 = wheel_center[0] + 1.25 * wheel_radius, 0.55 * half_x
     body += frame((x0, -0.85 * room_y, height - 0.001), (x1, 0.85 * room_y, chimney_high), [wall] * 4, 0, 1)
-    body += cylinder(
-        ((x0 + x1) / 2, 0, height - 0.001), ((x0 + x1) / 2, 0, chimney_high - 0.003), 0.25 * room_y, sections=10
-    )
+    body += rod((x0 + x1) / 2, 0, (height - 0.001, chimney_high - 0.003), 0.25 * room_y, sections=10)
     body += _fork(wheel_center, wheel_half + GAP, 0.3 * room_y, height - 0.001, 0.7 * wheel_radius)
     hinge_x = half_x + 0.0012
     low = height + GAP
     knuckle = 0.0012
-    body += cylinder((hinge_x, -0.5 * half_y, height), (hinge_x, 0.5 * half_y, height), 0.8 * knuckle, sections=10)
+    body += rod(hinge_x, (-0.5 * half_y, 0.5 * half_y), height, 0.8 * knuckle, sections=10)
     body += box((half_x - 0.001, hinge_x), 0.45 * half_y, (height - 0.004, height - 0.0001))
     lighter = Assembly("body", body, 4000.0)
     # The lid is a cap with walls, open at the bottom.
@@ -103,7 +101,7 @@ def _pocket(rng: Rng) -> Assembly:
     lid += loft([lifted(plan, high - wall - 0.0002), lifted(plan * (0.85 if dome else 0.97), high + dome)])
     for side in (-1, 1):
         y0, y1 = sorted((side * 0.53 * half_y, side * 0.85 * half_y))
-        lid += cylinder((hinge_x, y0, height), (hinge_x, y1, height), knuckle, sections=10)
+        lid += rod(hinge_x, (y0, y1), height, knuckle, sections=10)
         lid += box((half_x - 0.0005, hinge_x), (y0, y1), (low, low + 0.004))
     limit = rng.uniform(1.6, 2.6)
     lighter.add("lid", lid, revolute("body", (0, 1, 0), (hinge_x, 0, height), 0.0, limit), density=7000.0)
@@ -133,7 +131,7 @@ def _disposable(rng: Rng) -> Assembly:
     hood += hood.mirrored(1)
     hood += box((back * 0.8, back * 0.96), side, (height - 0.001, height + hood_tall * rng.uniform(0.6, 1.0)))
     nozzle = 0.5 * half_x
-    hood += cylinder((nozzle, 0, height - 0.001), (nozzle, 0, height + 0.55 * hood_tall), 0.002, sections=10)
+    hood += rod(nozzle, 0, (height - 0.001, height + 0.55 * hood_tall), 0.002, sections=10)
     body += hood
     if electric:
         travel = rng.uniform(0.003, 0.006)
@@ -263,7 +261,7 @@ def _table(rng: Rng) -> Assembly:
     wide, hinge_x = 0.75 * half_y, 0.78 * half_x
     flame = 0.5 * (split + hinge_x)
     burner = min(0.22 * half_y, 0.5 * (hinge_x - split) - 0.0035)  # before the flap's tongue
-    body += cylinder((flame, 0, height - 0.001), (flame, 0, height + 0.5 * flap_tall), burner, sections=12)
+    body += rod(flame, 0, (height - 0.001, height + 0.5 * flap_tall), burner, sections=12)
     low = height + travel + GAP
     top = low + rng.uniform(0.004, 0.014)
     button = box((-0.8 * half_x, split - 2 * GAP - 0.001), 0.7 * wide, (low, top), fillet=rng.uniform(0.001, 0.004))
@@ -286,6 +284,6 @@ def _table(rng: Rng) -> Assembly:
     lighter.add("button", button, prismatic("body", (0, 0, -1), 0.0, travel, (-0.4 * half_x, 0, top)), density=1500.0)
     if rng.random() < 0.35:  # a wheel below for the gas
         radius = 0.4 * half_y
-        wheel = cylinder((0, 0, -0.003 - GAP), (0, 0, -GAP), radius, 0.9 * radius, 16)
+        wheel = rod(0, 0, (-0.003 - GAP, -GAP), radius, 0.9 * radius, 16)
         lighter.add("dial", wheel, continuous("body", (0, 0, 1), (0, 0, 0)), density=1500.0)
     return lighter

@@ -13,7 +13,7 @@ from artsim.families.details import dial, front_handle, push_button, side_hinge,
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import turns
-from artsim.making.solids import Solid, box, cylinder, posts, tray, union
+from artsim.making.solids import Solid, box, posts, rod, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -164,8 +164,8 @@ def _turntable(rng: Rng, low: Array, high: Array, center: Array) -> Solid:
     """Glass plate with a raised rim of beads, 3 mm above the floor."""
     x, y, z = center[0], center[1], low[2] + 0.002
     radius = 0.5 * min(high[0] - low[0], high[1] - low[1]) - rng.uniform(0.006, 0.02)
-    solid = cylinder((x, y, z + 0.006), (x, y, z + 0.012), 0.93 * radius, radius, 32)
-    solid += cylinder((x, y, z), (x, y, z + 0.008), rng.uniform(0.03, 0.05), sections=12)
+    solid = rod(x, y, (z + 0.006, z + 0.012), 0.93 * radius, radius, 32)
+    solid += rod(x, y, (z, z + 0.008), rng.uniform(0.03, 0.05), sections=12)
     for a in turns(3):
         point = np.array([x + 0.8 * radius * cos(a), y + 0.8 * radius * sin(a), z + 0.012])
         solid += box(point - (0.012, 0.006, 0.003), point + (0.012, 0.006, 0.0015))

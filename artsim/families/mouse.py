@@ -16,7 +16,7 @@ from artsim.families.details import holed_plate
 from artsim.families.keys import Face, key, key_outline, press, top_face
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, revolute
 from artsim.making.outlines import rotation_about
-from artsim.making.solids import Solid, cylinder, ellipsoid, hull, loft, tube, union
+from artsim.making.solids import Solid, cylinder, ellipsoid, hull, loft, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0007
@@ -196,7 +196,7 @@ def _shell(rng: Rng, parts: _Parts, dome: _Dome) -> None:
         parts.add(name, solid, revolute("body", (0, -1, 0), (edge, 0, hinge_z), 0.0, angle))
     if wheel is not None:
         x, z, radius, wide = wheel
-        solid = cylinder((x, drift - wide, z), (x, drift + wide, z), radius, sections=20)
+        solid = rod(x, (drift - wide, drift + wide), z, radius, sections=20)
         if rng.random() < 0.6:
             for a in np.arange(10) * 0.2 * np.pi:
                 at, side = np.array([x + 0.97 * radius * cos(a), drift, z + 0.97 * radius * sin(a)]), (0, 0.9 * wide, 0)

@@ -14,7 +14,7 @@ from artsim.common.elementary import arctan2
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel, wire_shelf
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, posts, tray, union
+from artsim.making.solids import Solid, box, frame, posts, rod, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -126,12 +126,12 @@ def _hob(rng: Rng, half: float, depth: float, z: float, thick: float, rise: floa
         for y in ys:
             radius = min(rng.uniform(0.06, 0.1), 0.2 * depth) if kind != "gas" else rng.uniform(0.025, 0.045)
             if kind == "glass":
-                solid += cylinder((x, y, top), (x, y, top + 0.0045), radius, sections=28)
+                solid += rod(x, y, (top, top + 0.0045), radius, sections=28)
             elif kind == "coil":
-                solid += cylinder((x, y, top - 0.001), (x, y, top + 0.006), radius, sections=28)
-                solid += cylinder((x, y, top), (x, y, top + 0.014), 0.75 * radius, sections=24)
+                solid += rod(x, y, (top - 0.001, top + 0.006), radius, sections=28)
+                solid += rod(x, y, (top, top + 0.014), 0.75 * radius, sections=24)
             else:
-                solid += cylinder((x, y, top - 0.001), (x, y, top + 0.012), radius, 0.8 * radius, 20)
+                solid += rod(x, y, (top - 0.001, top + 0.012), radius, 0.8 * radius, 20)
     if kind == "gas":
         solid += union(_grate(0.46 * depth, y, 0.4 * depth, 0.92 * half / columns, top) for y in ys)
     return solid

@@ -16,7 +16,7 @@ from artsim.families.desk_phone import desk_set
 from artsim.families.keys import Face, add_function_keys, add_key, add_keypad, cross_sections, front_face, key_outline
 from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
 from artsim.making.outlines import about, lifted
-from artsim.making.solids import Solid, box, cylinder, hull, loft, union
+from artsim.making.solids import Solid, box, hull, loft, rod, union
 
 GAP = 0.0005
 UNDER_LID = (0.001, 0.0016)
@@ -75,10 +75,10 @@ def _aerial(rng: Rng, phone: Assembly, half: float, x: float, length: float, thi
     radius = min(rng.uniform(0.0015, 0.004), 0.4 * thick)
     side = float(rng.choice([-1.0, 1.0]))
     y, z = side * (half + radius + 0.002), 0.93 * length  # clear of keys on the edge
-    rod = cylinder((x, y, z), (x, y, z - length * rng.uniform(0.4, 0.85)), radius, sections=12)
-    rod += cylinder((x, y - side * radius, z), (x, y + 0.5 * side * radius, z), 1.4 * radius, sections=14)
+    stalk = rod(x, y, (z, z - length * rng.uniform(0.4, 0.85)), radius, sections=12)
+    stalk += rod(x, (y - side * radius, y + 0.5 * side * radius), z, 1.4 * radius, sections=14)
     turn = revolute("body", (0, float(rng.choice([-1.0, 1.0])), 0), (x, y, z), 0.0, rng.uniform(1.6, 3.14))
-    phone.add("antenna", rod, turn, density=2000.0)
+    phone.add("antenna", stalk, turn, density=2000.0)
 
 
 def _stand(rng: Rng, phone: Assembly, half: float, x: float, length: float) -> None:
@@ -100,7 +100,7 @@ def _bar(rng: Rng, phone: Assembly) -> None:
     body += box((-0.0006, 0.001), inner, (split + 0.04 * length, 0.9 * length))
     if rng.random() < 0.35:  # a stub of an antenna
         y, top = rng.choice([-0.6, 0.6]) * half, length * rng.uniform(1.08, 1.35)
-        body += cylinder((0.5 * thick, y, 0.9 * length), (0.5 * thick, y, top), 0.3 * thick, 0.22 * thick, 12)
+        body += rod(0.5 * thick, y, (0.9 * length, top), 0.3 * thick, 0.22 * thick, 12)
     phone.add("body", body)
     height = rng.uniform(0.0011, 0.0026)
     add_keypad(rng, phone, "body", front_face(0.0), inner, (0.1 * length, split), height)
@@ -125,12 +125,12 @@ def _flip(rng: Rng, phone: Assembly) -> None:
     knuckle = plane + radius
     for s in (-1.0, 1.0):
         first, last = sorted((s * (span + GAP), s * half * 0.98))
-        body += cylinder((plane, first, pivot), (plane, last, pivot), radius, sections=16)
+        body += rod(plane, (first, last), pivot, radius, sections=16)
         body += box((plane + 0.0003, max(lower * 0.5, knuckle)), (first, last), (top - 4.0 * radius, pivot))
     phone.add("body", body)
     bottom = rng.uniform(0.0, 0.45) * top if rng.random() < 0.3 else 0.0
     lid = _slab(rng, half, (plane - upper, plane), (bottom, pivot - radius - GAP), -1)
-    lid += cylinder((plane, GAP - span, pivot), (plane, span - GAP, pivot), radius * 0.9, sections=16)
+    lid += rod(plane, (GAP - span, span - GAP), pivot, radius * 0.9, sections=16)
     lid += box((plane - min(upper, radius), plane), span - GAP, (pivot - 4.0 * radius, pivot))
     if rng.random() < 0.6:  # a small display on the outside
         z = bottom + rng.uniform(0.45, 0.7) * (pivot - bottom)
@@ -180,11 +180,11 @@ def _swivel(rng: Rng, phone: Assembly) -> None:
     plane = -height - GAP
     pivot = length - half * rng.uniform(0.8, 1.0)
     body = _slab(rng, half, (0.0, lower), (0.0, length), 1)
-    body += cylinder((plane + GAP, 0, pivot), (0.001, 0, pivot), 0.7 * half, sections=20)
+    body += rod((plane + GAP, 0.001), 0, pivot, 0.7 * half, sections=20)
     phone.add("body", body)
     upper = thick - lower
     lid = _slab(rng, half, (plane - upper, plane), (0.0, length), -1)
-    lid += cylinder((plane - upper - 0.0006, 0, pivot), (plane, 0, pivot), 0.5 * half, sections=20)
+    lid += rod((plane - upper - 0.0006, plane), 0, pivot, 0.5 * half, sections=20)
     side = float(rng.choice([-1.0, 1.0]))
     phone.add("lid", lid, revolute("body", (side, 0, 0), (plane, 0, pivot), 0.0, rng.uniform(1.57, 3.2)))
     add_keypad(rng, phone, "body", front_face(0.0), 0.78 * half, (0.06 * length, pivot - 0.75 * half), height)
@@ -202,13 +202,13 @@ def _fold(rng: Rng, phone: Assembly) -> None:
     first = np.linspace(0.03, 0.97, 6) * length
     reach = sorted((side * 0.5 * half, y))
     for low, high in ((first[0], first[1]), (first[4], first[5])):
-        body += cylinder((0, y, low), (0, y, high), radius, sections=16)
+        body += rod(0, y, (low, high), radius, sections=16)
         body += box((0.5 * gap, 0.5 * gap + 0.5 * (leaf - 0.5 * gap)), (reach[0], reach[1]), (low, high))
     bump = (leaf - 0.0005, leaf + 0.0016), (-0.6 * half, 0.1 * half), (0.7 * length, 0.95 * length)
     body += box(*bump, fillet=0.3 * half, axis=0, steps=2)
     phone.add("body", body, density=1500.0)
     lid = _slab(rng, half, (-leaf, -0.5 * gap), (0.0, length), -1)
-    lid += cylinder((0, y, first[1] + GAP), (0, y, first[4] - GAP), radius, sections=16)
+    lid += rod(0, y, (first[1] + GAP, first[4] - GAP), radius, sections=16)
     lid += box((-0.5 * leaf - 0.25 * gap, -0.5 * gap), (reach[0], reach[1]), (first[1] + GAP, first[4] - GAP))
     phone.add("lid", lid, revolute("body", (0, 0, -side), (0, y, 0), 0.0, rng.uniform(1.6, 3.1)), density=1500.0)
     _side_keys(rng, phone, "body", half, 0.5 * leaf + 0.25 * gap, (0.0, length), leaf, (-side,))
@@ -268,7 +268,7 @@ def _cordless(rng: Rng, phone: Assembly) -> None:
     if rng.random() < 0.4:
         y = rng.choice([-0.6, 0.6]) * half
         top = start + length * rng.uniform(1.08, 1.4)
-        body += cylinder((0, y, start + 0.9 * length), (0, y, top), 0.25 * thick, 0.18 * thick, 12)
+        body += rod(0, y, (start + 0.9 * length, top), 0.25 * thick, 0.18 * thick, 12)
     lift = prismatic("dock", (0, 0, 1), 0.0, length * rng.uniform(0.4, 1.2), (0, 0, start))
     phone.add("handset", body, lift, density=900.0)
     add_keypad(rng, phone, "handset", face, inner, (rise + 0.05 * length, 0.66 * length), rng.uniform(0.0011, 0.002))

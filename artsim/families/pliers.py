@@ -11,7 +11,7 @@ import numpy as np
 from artsim.common.elementary import power, sin
 from artsim.common.products import norm
 from artsim.making.assembly import Assembly, Rng, pick, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, loft, prism, union
+from artsim.making.solids import Solid, box, cylinder, hull_of, loft, prism, rod, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0006
@@ -39,19 +39,19 @@ def build(rng: Rng) -> Assembly:
         low = 0.0 if k == 0 else 0.5 * (thick + GAP)
         high = low + 0.5 * (thick - GAP)
         solid = union(prism(piece * (1, side), 0.0, thick) for piece in jaws)
-        solid += cylinder((0, 0, low), (0, 0, high), disc)
+        solid += rod(0, 0, (low, high), disc)
         start = jaws[0][0, 0]
         anchor = np.array([(x, side * y) for x in (start, start - 0.0015) for y in (0.4 * near, 0.95 * near)])
-        solid += hull_of(cylinder((0, 0, low), (0, 0, high), 0.75 * disc), prism(anchor, low, high))
+        solid += hull_of(rod(0, 0, (low, high), 0.75 * disc), prism(anchor, low, high))
         neck = path[0] * (1, side)
-        root = cylinder((neck[0], neck[1], low), (neck[0], neck[1], high), radii[0])
-        solid += hull_of(cylinder((0, 0, low), (0, 0, high), 0.75 * disc), root)
+        root = rod(neck[0], neck[1], (low, high), radii[0])
+        solid += hull_of(rod(0, 0, (low, high), 0.75 * disc), root)
         solid += _handle(path * (1, side), radii, thick, covered, guard, side)
         if teeth:  # ribs across the front of the jaw, in front of its hollow
             for x in np.linspace(-0.6 * jaw, -0.95 * jaw, 6):
                 solid += box((x - 0.0006, x + 0.0006), (-side * 0.3 * GAP, -side * 0.003), (0.1 * thick, 0.9 * thick))
         face, outward = (0.0, -1) if k == 0 else (thick, 1)
-        solid += cylinder((0, 0, face - 0.001 * outward), (0, 0, face + 0.001 * outward), rivet, 0.85 * rivet)
+        solid += rod(0, 0, (face - 0.001 * outward, face + 0.001 * outward), rivet, 0.85 * rivet)
         joint = None
         if k:
             joint = revolute("lever_1", (0, 0, -1), (0, 0, thick / 2), 0.0, np.deg2rad(rng.uniform(25, 60)))

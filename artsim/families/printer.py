@@ -15,7 +15,7 @@ import numpy as np
 from artsim.families.keys import add_key, front_face, key_cells, key_outline, top_face
 from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
 from artsim.making.outlines import FRONT, about, rounded_rectangle
-from artsim.making.solids import Solid, box, cylinder, hull, posts, prism, tray, union
+from artsim.making.solids import Solid, box, hull, posts, prism, rod, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -114,7 +114,7 @@ def _feet(case: _Case, height: float, casters: bool) -> Solid:
         radius = 0.45 * height
         spots = [(a * 0.75 * case.x, b * 0.75 * case.y) for a in (-1, 1) for b in (-1, 1)]
         return union(
-            cylinder((x, y - 0.4 * radius, radius), (x, y + 0.4 * radius, radius), radius, sections=14)
+            rod(x, (y - 0.4 * radius, y + 0.4 * radius), radius, radius, sections=14)
             + box(about(x, 0.5 * radius), about(y, 0.6 * radius), (radius, height + 0.001))
             for x, y in spots
         )
@@ -284,6 +284,6 @@ def _paper_support(rng: Rng, printer: Assembly, case: _Case, seam: float, front:
     thick, wide = rng.uniform(0.004, 0.01), case.y * rng.uniform(0.5, 0.85)
     solid = box((front + GAP, case.x - 0.004), wide, (seam, seam + thick), fillet=0.01, axis=2)
     x, z = case.x - 0.004, seam + 0.5 * thick
-    solid += cylinder((x, -wide, z), (x, wide, z), 0.5 * thick, sections=12)
+    solid += rod(x, (-wide, wide), z, 0.5 * thick, sections=12)
     hinge = revolute("body", (0, 1, 0), (x, 0, z), 0.0, rng.uniform(1.3, 2.1))
     printer.add("paper_support", solid, hinge, density=800.0)

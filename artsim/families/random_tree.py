@@ -18,7 +18,7 @@ from artsim.common.elementary import cos, exp, log
 from artsim.common.products import apply, matmul, norm, unit
 from artsim.making.assembly import Assembly, JointSpec, Rng, pick
 from artsim.making.outlines import rotation_about
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, ring, tube, union
+from artsim.making.solids import Solid, box, ellipsoid, hull, ring, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -108,9 +108,9 @@ def _grow(rng: Rng, k: int, parents: list[int], scale: float) -> _Branch:
         branch.solid = solid.moved((0, 0, lift - bounds[0, 2]))
         branch.boxes = [branch.solid.bounds()]
         if hinged:
-            rod = tube([(0, 0, 0.3 * neck), (0, 0, lift - bounds[0, 2])], neck, 10) + ellipsoid((0, 0, neck), neck, 12)
+            stem = tube([(0, 0, 0.3 * neck), (0, 0, lift - bounds[0, 2])], neck, 10) + ellipsoid((0, 0, neck), neck, 12)
             branch.boxes.append(np.array([[-neck, -neck, 0], [neck, neck, lift]]))
-            branch.solid += rod
+            branch.solid += stem
             branch.hinge_height = neck
         branch.boxes.append(_BELOW)
     bounds = branch.boxes[0]
@@ -136,9 +136,9 @@ def _shape(rng: Rng, size: Array) -> Solid:
     if kind == "rounded":
         return box(-half, half, fillet=0.3 * size.min(), steps=2)
     if kind == "cylinder":
-        return cylinder((0, 0, -z), (0, 0, z), min(x, y))
+        return rod(0, 0, (-z, z), min(x, y))
     if kind == "cone":
-        return cylinder((0, 0, -z), (0, 0, z), min(x, y), rng.uniform(0.2, 0.7) * min(x, y))
+        return rod(0, 0, (-z, z), min(x, y), rng.uniform(0.2, 0.7) * min(x, y))
     if kind == "ball":
         return ellipsoid((0, 0, 0), 0.5 * (half + half.min()))
     if kind == "frame":
@@ -220,10 +220,10 @@ def _attach(
             if stub >= shortest:
                 break
             start, end = (np.where(across, inner, surface + side * s) for s in (0.0, stub))
-            rod = _box_around(np.stack([start, end])) + np.array([[-radius], [radius]]) * across
+            stem = _box_around(np.stack([start, end])) + np.array([[-radius], [radius]]) * across
             foot = np.where(across, inner, surface + side * (stub + lift))
-            if not _meet(reach + foot, np.array(parent.boxes)) and not _meet(rod[None], np.array(parent.boxes[1:])):
-                shortest, chosen = stub, (choice, rotation, foot, end, [*(reach + foot), rod])
+            if not _meet(reach + foot, np.array(parent.boxes)) and not _meet(stem[None], np.array(parent.boxes[1:])):
+                shortest, chosen = stub, (choice, rotation, foot, end, [*(reach + foot), stem])
                 break
     if chosen is None:
         return None

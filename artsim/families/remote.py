@@ -15,7 +15,7 @@ from artsim.common.elementary import exp, sin
 from artsim.families.details import dial
 from artsim.families.keys import Face, add_key, cross_sections, front_face, key, key_cells, key_outline
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
-from artsim.making.solids import Solid, box, cylinder, loft, ring
+from artsim.making.solids import Solid, box, loft, ring, rod
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
@@ -226,7 +226,7 @@ def _front_cover(rng: Rng, remote: Assembly, body: _Body, height: float) -> None
     if rng.random() < 0.5:
         joint = prismatic("body", (0, 0, -1), 0.0, rng.uniform(0.6, 1.0) * (high - low), (back, 0, low))
     else:
-        cover += cylinder((back - thick, -half, low), (back - thick, half, low), 0.8 * thick, sections=10)
+        cover += rod(back - thick, (-half, half), low, 0.8 * thick, sections=10)
         joint = revolute("body", (0, -1, 0), (back - thick, 0, low), 0.0, rng.uniform(1.2, 2.6))
     remote.add("cover", cover, joint, density=1000.0)
 
@@ -236,6 +236,6 @@ def _antenna(rng: Rng, remote: Assembly, body: _Body) -> None:
     length = float(body.levels[-1])
     radius = rng.uniform(0.0015, 0.003)
     x, z = float(body.fronts[-1] + 0.5 * (body.backs[-1] - body.fronts[-1])), length + radius + GAP
-    rod = cylinder((x, 0, z), (x, 0, z + length * rng.uniform(0.2, 0.8)), radius, 0.7 * radius, 12)
-    rod += cylinder((x - radius, 0, z), (x + radius, 0, z), radius, sections=12)
-    remote.add("antenna", rod, revolute("body", (1, 0, 0), (x, 0, z), -0.35, 0.35), density=2000.0)
+    stalk = rod(x, 0, (z, z + length * rng.uniform(0.2, 0.8)), radius, 0.7 * radius, 12)
+    stalk += rod((x - radius, x + radius), 0, z, radius, sections=12)
+    remote.add("antenna", stalk, revolute("body", (1, 0, 0), (x, 0, z), -0.35, 0.35), density=2000.0)

@@ -15,7 +15,7 @@ from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import front_handle, rounded_shell, side_hinge
 from artsim.making.assembly import Assembly, Rng, continuous, pick, revolute
 from artsim.making.outlines import about, turns
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, posts, ring, tube, union
+from artsim.making.solids import Solid, box, ellipsoid, posts, ring, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -139,7 +139,7 @@ def _body(rng: Rng, s: Shape) -> Solid:
     if s.barrel > 0:
         x, y = s.hinge
         for low, high in _knuckles(s, of_door=False):
-            solid += cylinder((x, y, low), (x, y, high), s.barrel - 0.0005, sections=16)
+            solid += rod(x, y, (low, high), s.barrel - 0.0005, sections=16)
             solid += box((x, 0.002), (y, y + 0.6 * s.wall), (low, high))
     return solid
 
@@ -173,7 +173,7 @@ def _door(rng: Rng, s: Shape, combination: bool, opener: str) -> Solid:
     if s.barrel > 0:
         x, y = s.hinge
         for bottom, top in _knuckles(s, of_door=True):
-            solid += cylinder((x, y, bottom), (x, y, top), s.barrel - 0.0005, sections=16)
+            solid += rod(x, y, (bottom, top), s.barrel - 0.0005, sections=16)
             solid += box((x, 0.003), (y - 0.14 * wide, y), (bottom, top))
     if not combination:  # a keypad with its keys
         y, z, unit = low[1] + 0.66 * wide, low[2] + 0.66 * tall if tall > 0.85 * wide else low[2] + 0.5 * tall, 0.014
@@ -193,8 +193,8 @@ def _combination(rng: Rng, x: float, y: float, z: float, radius: float) -> Solid
     """Combination dial: a skirt, a grip and the mark it is read at."""
     x -= 0.0045
     skirt, reach = rng.uniform(0.006, 0.012), rng.uniform(0.02, 0.03)
-    solid = cylinder((x, y, z), (x - skirt, y, z), radius, 0.85 * radius, 28)
-    solid += cylinder((x - 0.5 * skirt, y, z), (x - skirt - reach, y, z), 0.55 * radius, 0.45 * radius, 16)
+    solid = rod((x, x - skirt), y, z, radius, 0.85 * radius, 28)
+    solid += rod((x - 0.5 * skirt, x - skirt - reach), y, z, 0.55 * radius, 0.45 * radius, 16)
     mark = (y - 0.03 * radius - 0.001, y + 0.03 * radius + 0.001)
     return solid + box((x - skirt - 0.002, x - 0.001), mark, (z + 0.5 * radius, z + 0.9 * radius))
 
@@ -203,7 +203,7 @@ def _wheel(rng: Rng, x: float, y: float, z: float, radius: float) -> Solid:
     """Hub with three to five spokes that end in balls or in a rim."""
     x -= 0.0045
     reach, spokes = rng.uniform(0.03, 0.05), int(rng.integers(3, 6))
-    solid = cylinder((x, y, z), (x - reach, y, z), 0.3 * radius, 0.22 * radius, 18)
+    solid = rod((x, x - reach), y, z, 0.3 * radius, 0.22 * radius, 18)
     rim = rng.random() < 0.4
     hub = np.array([x - 0.8 * reach, y, z])
     for a in turns(spokes, 0.25):
@@ -219,8 +219,8 @@ def _lever(rng: Rng, x: float, y: float, z: float, radius: float) -> Solid:
     """Lever on a round boss, level at rest."""
     x -= 0.0045
     reach = rng.uniform(0.025, 0.04)
-    solid = cylinder((x, y, z), (x - 0.008, y, z), 0.35 * radius, 0.3 * radius, 18)
-    solid += cylinder((x - 0.004, y, z), (x - reach, y, z), 0.16 * radius + 0.003, sections=14)
+    solid = rod((x, x - 0.008), y, z, 0.35 * radius, 0.3 * radius, 18)
+    solid += rod((x - 0.004, x - reach), y, z, 0.16 * radius + 0.003, sections=14)
     tip = np.array([x - reach, y - 1.1 * radius, z])
     if rng.random() < 0.5:
         return solid + tube(np.stack([tip + (0.004, 1.1 * radius, 0.0), tip]), [0.010, 0.007], 12)

@@ -16,7 +16,7 @@ import numpy as np
 from artsim.common.elementary import arcsin, arctan2, cos, hypot, sin
 from artsim.common.products import dot, matmul, norm
 from artsim.making.assembly import Assembly, Rng, pick, revolute
-from artsim.making.solids import Solid, cylinder, ellipsoid, hull, hull_of, loft, prism, tube, union
+from artsim.making.solids import Solid, ellipsoid, hull, hull_of, loft, prism, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
@@ -68,9 +68,7 @@ def build(rng: Rng) -> Assembly:
             solid += _finger_rest(rings[k], rest, bar, middle)
         outward = 1 if k else -1
         face = low + sheet if k else low
-        solid += cylinder(
-            (0, 0, face - 0.5 * outward * sheet), (0, 0, face + outward * button), pivot, 0.85 * pivot, 20
-        )
+        solid += rod(0, 0, (face - 0.5 * outward * sheet, face + outward * button), pivot, 0.85 * pivot, 20)
         blades.append(solid.rotated(_POINTS_TO_Y))
     scissors = Assembly(density=4500.0)
     # The upper blade is the root: its ring is the one towards -X.
@@ -133,8 +131,8 @@ def _handle(
     k = int(np.argmin(norm(loop)))
     near, top = path[k], low + sheet
     rear = np.array([(x, side * y) for x in (-0.3, -0.2) for y in (-0.78, 0.2)]) * width
-    end = cylinder((near[0], near[1], low), (near[0], near[1], top), 0.5 * bar, sections=16)
-    solid += hull_of(cylinder((0, 0, low), (0, 0, top), tang, sections=20), prism(rear, low, top), end)
+    end = rod(near[0], near[1], (low, top), 0.5 * bar, sections=16)
+    solid += hull_of(rod(0, 0, (low, top), tang, sections=20), prism(rear, low, top), end)
     if plastic:
         # A moulded body around the shank, from where it is clear of the other blade.
         share = min(max(0.35, 2.4 * width / near[0]), 0.8)

@@ -8,7 +8,7 @@ import numpy as np
 
 from artsim.families.wheels import STEEL, Wheels, bar
 from artsim.making.assembly import Assembly, Rng, pick, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, tube, union
+from artsim.making.solids import Solid, box, hull_of, rod, tube, union
 from artsim.model.kinematics import Array
 
 
@@ -77,7 +77,7 @@ def shopping_cart(rng: Rng) -> Assembly:
     grip = high + rng.uniform(0.02, 0.1)
     reach = 0.5 * length + rng.uniform(0.06, 0.14)
     body += union(bar((0.5 * length - 0.02, s * half, high), (reach, s * half, grip), tubes) for s in (-1.0, 1.0))
-    body += cylinder((reach, -half - 0.02, grip), (reach, half + 0.02, grip), 1.3 * tubes, sections=14)
+    body += rod(reach, (-half - 0.02, half + 0.02), grip, 1.3 * tubes, sections=14)
     spots = [(front, -track * narrow), (front, track * narrow), (back, -track), (back, track)]
     swivels = pick(rng, {2: 0.6, 4: 0.4})
     body += union(wheels.bracket(x, y, base - 0.5 * tubes) for x, y in spots[swivels:])

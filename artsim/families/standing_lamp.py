@@ -11,7 +11,7 @@ import numpy as np
 from artsim.common.elementary import cos, hypot, power, sin
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute, swivel
 from artsim.making.outlines import SIDE, UP
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube, union, vessel
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, rod, tube, union, vessel
 
 GAP = 0.002
 
@@ -31,9 +31,9 @@ def standing(rng: Rng) -> Assembly:
         sleeve, bore = rng.uniform(0.4, 0.6) * height, 0.6 * radius
         base += ring((0, 0, 0.5 * (floor + sleeve)), UP, bore + 0.001, radius + 0.002, sleeve - floor + 0.01, 12)
         travel = rng.uniform(0.4, 0.8) * (sleeve - floor)
-        pole = cylinder((0, 0, sleeve - travel - 0.02), (0, 0, height), bore, sections=12)
+        pole = rod(0, 0, (sleeve - travel - 0.02, height), bore, sections=12)
     else:
-        base += cylinder((0, 0, floor - 0.004), (0, 0, height), radius, sections=14)
+        base += rod(0, 0, (floor - 0.004, height), radius, sections=14)
     button = rng.random() < 0.35 and foot in ("disc", "square")
     lamp = Assembly("base", base, 2500.0)
     if slides:
@@ -47,7 +47,7 @@ def standing(rng: Rng) -> Assembly:
     shade = _shade(rng, kind, rim, tall, low)
     if tilts:  # a knuckle at the head of the pole carries it
         at = (0.0, 0.0, height + 0.015)
-        shade += cylinder((0, -0.006, at[2]), (0, 0.006, at[2]), 0.01, sections=14)
+        shade += rod(0, (-0.006, 0.006), at[2], 0.01, sections=14)
         shade += box(0.004, 0.004, (at[2], low + 0.004))
         reach = rng.uniform(0.4, 1.0)
         lamp.add("shade", shade, revolute(parent, SIDE, at, -reach, reach), density=500.0)
@@ -57,7 +57,7 @@ def standing(rng: Rng) -> Assembly:
     if button:
         size = rng.uniform(0.008, 0.014)
         x, top = -0.62 * wide, thick + GAP
-        key = cylinder((x, 0, top + 0.003), (x, 0, top + 0.008), size, sections=16)
+        key = rod(x, 0, (top + 0.003, top + 0.008), size, sections=16)
         lamp.add("button", key, prismatic("base", (0, 0, -1), 0.0, 0.003, (x, 0, top)), density=900.0)
     if rng.random() < 0.5 and not tilts and not slides:
         _switch(rng, lamp, radius, height)
@@ -67,7 +67,7 @@ def standing(rng: Rng) -> Assembly:
 def _foot(rng: Rng, kind: str, wide: float, thick: float, height: float, radius: float) -> tuple[Solid, float]:
     """Solid, and the height at which the pole begins."""
     if kind == "disc":
-        return cylinder((0, 0, 0), (0, 0, thick), wide, rng.uniform(0.8, 1.0) * wide, 36), thick
+        return rod(0, 0, (0, thick), wide, rng.uniform(0.8, 1.0) * wide, 36), thick
     if kind == "square":
         return box(wide, wide, (0, thick), fillet=rng.uniform(0.05, 0.5) * wide, axis=2), thick
     if kind == "legs":
@@ -79,7 +79,7 @@ def _foot(rng: Rng, kind: str, wide: float, thick: float, height: float, radius:
             tube([(span * cos(a), span * sin(a), size), (0.5 * radius * cos(a), 0.5 * radius * sin(a), head)], size, 10)
             for a in angles.tolist()
         )
-        return legs + cylinder((0, 0, head - 0.02), (0, 0, head + 0.02), 1.8 * radius + size, sections=16), head
+        return legs + rod(0, 0, (head - 0.02, head + 0.02), 1.8 * radius + size, sections=16), head
     top = rng.uniform(0.6, 0.85) * height
     shares = np.linspace(0.0, 1.0, 8)
     belly, waist = rng.uniform(0.5, 1.0) * wide, rng.uniform(0.2, 0.5) * wide
@@ -104,7 +104,7 @@ def _shade(rng: Rng, kind: str, rim: float, tall: float, low: float) -> Solid:
     if sections == 4:
         spokes = spokes.turned(UP, np.pi / 4)
     bulb = ellipsoid((0, 0, holder + 0.3 * tall), (0.2 * neck, 0.2 * neck, 0.22 * tall), 12)
-    return shell + spokes + bulb + cylinder((0, 0, low), (0, 0, holder + 0.25 * tall), 0.012, sections=14)
+    return shell + spokes + bulb + rod(0, 0, (low, holder + 0.25 * tall), 0.012, sections=14)
 
 
 def _switch(rng: Rng, lamp: Assembly, radius: float, height: float) -> None:
@@ -112,13 +112,13 @@ def _switch(rng: Rng, lamp: Assembly, radius: float, height: float) -> None:
     z = height - rng.uniform(0.03, 0.06)
     if rng.random() < 0.5:
         out = radius + GAP
-        dial = cylinder((-out, 0, z), (-out - 0.02, 0, z), 0.004, sections=10)
-        dial += cylinder((-out - 0.01, 0, z), (-out - 0.026, 0, z), 0.008, sections=8)
+        dial = rod((-out, -out - 0.02), 0, z, 0.004, sections=10)
+        dial += rod((-out - 0.01, -out - 0.026), 0, z, 0.008, sections=8)
         lamp.add("dial", dial, continuous("base", (-1, 0, 0), (-out, 0, z)), density=900.0)
         return
     x = -radius - 0.004
     long = min(rng.uniform(0.04, 0.15), 0.3 * height)
-    chain = cylinder((x, 0, z), (x, 0, z - long), 0.0016, sections=8) + ellipsoid((x, 0, z - long), 0.0035, 10)
+    chain = rod(x, 0, (z, z - long), 0.0016, sections=8) + ellipsoid((x, 0, z - long), 0.0035, 10)
     joint = prismatic("base", (0, 0, -1), 0.0, rng.uniform(0.01, 0.03), (x, 0, z))
     lamp.add("chain", chain.moved((-0.004, 0, 0)), joint, density=900.0)
 
@@ -131,11 +131,11 @@ def spotlight(rng: Rng) -> Assembly:
     mount = pick(rng, ["disc", "pole", "legs"])
     high = rng.uniform(0.01, 0.04) if mount == "disc" else rng.uniform(0.1, 1.1)
     wide = radius * rng.uniform(1.0, 1.8)
-    base = cylinder((0, 0, 0), (0, 0, min(high, 0.02)), wide, 0.9 * wide, 32)
+    base = rod(0, 0, (0, min(high, 0.02)), wide, 0.9 * wide, 32)
     if mount == "legs":
         base, _ = _foot(rng, "legs", wide, 0.02, high, 0.012)
     if mount != "disc":
-        base += cylinder((0, 0, 0.01 if mount == "pole" else 0.2 * high), (0, 0, high), 0.011, sections=14)
+        base += rod(0, 0, (0.01 if mount == "pole" else 0.2 * high, high), 0.011, sections=14)
     lamp = Assembly("base", base, 2500.0)
     low = high + GAP
     center = np.array([0.0, 0.0, low + thick + reach])
@@ -143,9 +143,7 @@ def spotlight(rng: Rng) -> Assembly:
     yoke = box(0.012, half + thick, (low, low + thick))
     for s in (-1, 1):
         a, b = sorted((s * half, s * (half + thick)))
-        yoke += hull_of(
-            box(0.012, (a, b), (low, low + thick)), cylinder((0, a, center[2]), (0, b, center[2]), 0.012, sections=14)
-        )
+        yoke += hull_of(box(0.012, (a, b), (low, low + thick)), rod(0, (a, b), center[2], 0.012, sections=14))
     lamp.add("yoke", yoke, continuous("base", UP, (0, 0, high)))
     # The front of the head looks to -X.
     rim = radius * rng.uniform(0.75, 1.0)
@@ -155,7 +153,7 @@ def spotlight(rng: Rng) -> Assembly:
     head += ring(start, (1, 0, 0), 0.8 * rim, rim, 0.012, 24)
     for s in (-1, 1):
         a, b = sorted((s * 0.6 * radius, s * (half - 0.0015)))
-        head += cylinder((0, a, center[2]), (0, b, center[2]), 0.008, sections=12)
+        head += rod(0, (a, b), center[2], 0.008, sections=12)
     lower, upper = -rng.uniform(0.3, 1.3), rng.uniform(0.3, 1.5)
     lamp.add("head", head, revolute("yoke", SIDE, center, lower, upper), density=1200.0)
     if rng.random() < 0.4:

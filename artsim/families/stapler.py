@@ -15,7 +15,7 @@ from artsim.common.elementary import cos, sin
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.outlines import rounded_rectangle
-from artsim.making.solids import Solid, box, cylinder, hull_of, loft, prism
+from artsim.making.solids import Solid, box, hull_of, loft, prism, rod
 from artsim.model.kinematics import Array
 
 GAP = 0.0008
@@ -105,7 +105,7 @@ def _base(rng: Rng, lay: Layout, arm_width: float) -> Solid:
     kind = pick(rng, {"plain": 0.5, "boat": 0.3, "round": 0.2})
     if kind == "round":
         half = max(half, min(half * rng.uniform(1.3, 1.9), 0.3 * (back - front)))
-        ends = [cylinder((x, 0, 0), (x, 0, 0.6 * lay.base), half, 0.94 * half, 32) for x in (front + half, back - half)]
+        ends = [rod(x, 0, (0, 0.6 * lay.base), half, 0.94 * half, 32) for x in (front + half, back - half)]
         solid = hull_of(*ends) + box(
             (front + 0.4 * half, back), 0.5 * arm_width, (0.001, lay.base), fillet=0.003, axis=2
         )
@@ -127,7 +127,7 @@ def _base(rng: Rng, lay: Layout, arm_width: float) -> Solid:
         crown = [(-0.5 * lay.tail, rise), (0.4 * lay.tail, rise), (min(0.9 * lay.tail, 0.98 * back), lay.hinge)]
         solid += prism(foot + crown, y[0], y[1], axis=1)
         head = side * (inside + cheek)
-        solid += cylinder((0, head - side * 0.001, lay.hinge), (0, head + side * 0.0008, lay.hinge), 0.3 * lay.tail)
+        solid += rod(0, (head - side * 0.001, head + side * 0.0008), lay.hinge, 0.3 * lay.tail)
     if rng.random() < 0.4:
         solid += box((front + 0.008, back - 0.006), 0.8 * half, (-0.0015, 0.001), fillet=0.003, axis=2)
     return solid
@@ -140,7 +140,7 @@ def _magazine(rng: Rng, lay: Layout) -> Solid:
     high = lay.magazine
     start = -lay.length + rng.uniform(0.0, 0.004)
     solid = box((start, -1.4 * lay.tail), half, (low, high))
-    tongue = cylinder((0, -half, lay.hinge), (0, half, lay.hinge), high - lay.hinge, sections=20)
+    tongue = rod(0, (-half, half), lay.hinge, high - lay.hinge, sections=20)
     solid += hull_of(tongue, box((-1.6 * lay.tail, -1.4 * lay.tail), half, (low, high)))
     return solid + box((start - 0.0015, start + 0.001), 0.8 * half, (low + 0.001, high - 0.001))
 
@@ -183,7 +183,7 @@ def _arm(rng: Rng, lay: Layout, width: float) -> Solid:
         y = sorted((side * (0.5 * lay.width + GAP), side * narrow))
         skirt = [(0.92 * front, low + 0.001), (0.88 * front, low - hem), (neck, low - hem), (neck, low + 0.001)]
         solid += prism(skirt, y[0], y[1], axis=1)
-        eye = cylinder((0, y[0], lay.hinge), (0, y[1], lay.hinge), 0.7 * lay.tail, sections=16)
+        eye = rod(0, (y[0], y[1]), lay.hinge, 0.7 * lay.tail, sections=16)
         ends = box((neck, 0.3 * lay.tail), (y[0], y[1]), (low, low + 0.002))
         solid += hull_of(eye, ends)
     return solid

@@ -14,7 +14,7 @@ from artsim.common.elementary import arctan2, cos, power, sin
 from artsim.families.details import bow_handle, rounded_tray
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import about, lifted, rounded_rectangle
-from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, tube, union
+from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.001
@@ -61,7 +61,7 @@ def _trolley(rng: Rng) -> Assembly:
     hinge_y = side * (y + 0.004)
     for share in (0.2, 0.5, 0.8):
         z = lift + share * (high - lift)
-        front += cylinder((seam, hinge_y, z - 0.025), (seam, hinge_y, z + 0.025), 0.0022, sections=12)
+        front += rod(seam, hinge_y, (z - 0.025, z + 0.025), 0.0022, sections=12)
         front += box((seam - 0.012, min(hinge_y, side * (y - 0.002)), z - 0.025),
                      (seam - GAP / 2, max(hinge_y, side * (y - 0.002)), z + 0.025))  # fmt: skip
     middle = 0.5 * (x + seam)
@@ -81,7 +81,7 @@ def _trolley(rng: Rng) -> Assembly:
         places = [(wheel_x, s * (y - 0.05), "body") for s in (-1, 1)]
         places += [(front_x, s * (y - 0.05), "lid" if front_x < seam else "body") for s in (-1, 1)]
         for px, py, parent in places:
-            mount = cylinder((px, py, lift - 0.003), (px, py, lift + 0.02), 0.022, 0.026, 16)
+            mount = rod(px, py, (lift - 0.003, lift + 0.02), 0.022, 0.026, 16)
             front, back = (front + mount, back) if parent == "lid" else (front, back + mount)
     else:
         places = []
@@ -137,7 +137,7 @@ def _telescope(rng: Rng, case: Assembly, x: float, half: float, low: float, high
 def _caster(case: Assembly, number: int, x: float, y: float, top: float, parent: str) -> None:
     """A fork that swivels below its mount, and a wheel in it."""
     radius, offset = 0.5 * (top - 0.009), 0.012
-    fork = cylinder((x, y, top - 0.007), (x, y, top - GAP), 0.02, sections=16)
+    fork = rod(x, y, (top - 0.007, top - GAP), 0.02, sections=16)
     center = np.array([x + offset, y, radius])
     for s in (-1.0, 1.0):
         side = y + s * 0.0125
@@ -158,7 +158,7 @@ def _briefcase(rng: Rng) -> Assembly:
     barrel = 0.003
     for share in (-0.6, 0.6):
         ends = (share * y - 0.03, share * y + 0.03)
-        front += cylinder((seam, ends[0], -barrel - 0.001), (seam, ends[1], -barrel - 0.001), barrel, sections=12)
+        front += rod(seam, (ends[0], ends[1]), -barrel - 0.001, barrel, sections=12)
         front += box((seam - 0.012, seam - GAP / 2), (ends[0], ends[1]), (-barrel - 0.001, 0.002))
     middle = 0.5 * (x + seam)
     half = rng.uniform(0.05, 0.08)
@@ -166,9 +166,7 @@ def _briefcase(rng: Rng) -> Assembly:
     for s in (-1.0, 1.0):  # locks beside the handle
         front += box((seam - 0.02, seam - GAP / 2), (s * 0.6 * y - 0.02, s * 0.6 * y + 0.02), (z - 0.002, z + 0.004))
     if rng.random() < 0.6:
-        back += union(
-            cylinder((0.6 * x, s * 0.8 * y, -0.008), (0.6 * x, s * 0.8 * y, 0.003), 0.008, 0.01, 12) for s in (-1, 1)
-        )
+        back += union(rod(0.6 * x, s * 0.8 * y, (-0.008, 0.003), 0.008, 0.01, 12) for s in (-1, 1))
     fixed = rng.random() < 0.35  # the handle
     case = Assembly("body", back + lugs + handle if fixed else back + lugs, 300.0)
     limit = np.deg2rad(rng.uniform(45.0, 175.0))
@@ -191,13 +189,13 @@ def _bail(
     x, _, z = center
     angles = np.linspace(0.0, np.pi, 15)
     cosine = cos(angles)
-    path: Array = np.column_stack([
-        np.full(15, x), half * np.sign(cosine) * power(np.abs(cosine), 0.6), z + height * power(sin(angles), 0.7)
-    ])  # fmt: skip
+    path: Array = np.column_stack(
+        [np.full(15, x), half * np.sign(cosine) * power(np.abs(cosine), 0.6), z + height * power(sin(angles), 0.7)]
+    )
     handle, lugs = tube(path, wire, 10), Solid()
     barrel = wire + 0.001
     for s in (-1.0, 1.0):
-        handle += cylinder((x, s * half - 0.006, z), (x, s * half + 0.006, z), barrel, sections=12)
+        handle += rod(x, (s * half - 0.006, s * half + 0.006), z, barrel, sections=12)
         for side in (-0.009, 0.009):
             y = s * half + side
             low, high = np.array([x - 0.005, y - 0.002, z - 0.005]), np.array([x + 0.005, y + 0.002, z + 0.005])

@@ -13,7 +13,7 @@ import numpy as np
 from artsim.common.elementary import arctan, sin, tan
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, Rng, pick, revolute
-from artsim.making.solids import Solid, box, cylinder, frame, hull_of, union
+from artsim.making.solids import Solid, box, frame, hull_of, rod, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0007
@@ -111,7 +111,7 @@ def _plate(rng: Rng, width: float, height: float, depth: float, screws: bool) ->
             solid += box((-edge, *low), (0, *high), fillet=0.0025)
     if screws and rng.random() < 0.5:
         z = half[1] - 0.008
-        solid += union(cylinder((-depth - 0.0006, 0, s * z), (-0.001, 0, s * z), 0.0028, sections=14) for s in (-1, 1))
+        solid += union(rod((-depth - 0.0006, -0.001), 0, s * z, 0.0028, sections=14) for s in (-1, 1))
     return solid
 
 
@@ -142,7 +142,7 @@ def _toggle(rng: Rng, center: Array, depth: float) -> Solid:
     x = -depth - 0.006
     wide, r = rng.uniform(0.0035, 0.006), 0.0045
     length = with_tails(rng, (0.012, 0.02), (0.007, 0.028), 0.3)
-    hub = cylinder((x, -wide, 0), (x, wide, 0), r, sections=18)
+    hub = rod(x, (-wide, wide), 0, r, sections=18)
     root = box((x - 0.003, x), wide, 0.003, fillet=0.001)
     tip_half = rng.uniform(0.003, 0.0043)
     tip = box((x - length, x - length + 0.004), wide * 1.1, tip_half, fillet=0.0015)
@@ -153,6 +153,6 @@ def _dimmer(rng: Rng, center: Array, depth: float, radius: float) -> Solid:
     """A round knob with a pointer."""
     r, tall = min(radius, rng.uniform(0.012, 0.02)), rng.uniform(0.009, 0.016)
     x = -depth - GAP
-    solid = cylinder((x, 0, 0), (x - tall, 0, 0), r, rng.uniform(0.8, 0.98) * r, 32)
+    solid = rod((x, x - tall), 0, 0, r, rng.uniform(0.8, 0.98) * r, 32)
     solid += box((x - tall - 0.0008, x - 0.5 * tall), 0.0012, (0.2 * r, 0.75 * r))
     return solid.moved((0, *center))

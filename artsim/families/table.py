@@ -17,7 +17,7 @@ from artsim.families.proportions import unusual_sides, with_tails
 from artsim.families.table_parts import GAP, add_case, drop_leaves, four_legs, keyboard_tray, table_top, wheels
 from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute, swivel
 from artsim.making.outlines import UP, about, lifted, superellipse, turns
-from artsim.making.solids import Solid, box, cylinder, hull_of, loft, ring, union
+from artsim.making.solids import Solid, box, hull_of, loft, ring, rod, union
 
 LEAST_SHARES, MOST_SHARES = (0.105, 0.27, 0.12), (0.79, 0.985, 0.94)
 """Depth, width and height of unusual tables over their diagonal."""
@@ -227,25 +227,23 @@ def _column(rng: Rng, table: Assembly) -> None:
         base += leg.turned(UP, angle)
         spots.append((span * cos(angle), span * sin(angle)))
     if not feet:
-        base += cylinder((0, 0, 0), (0, 0, 0.02), span, 0.9 * span, 32) + cylinder(
-            (0, 0, 0.02), (0, 0, 0.06), 2 * radius, radius, 24
-        )
+        base += rod(0, 0, (0, 0.02), span, 0.9 * span, 32) + rod(0, 0, (0.02, 0.06), 2 * radius, radius, 24)
     kind = pick(rng, ["turning", "tipping", "rising"])
     top = height - thick
     if kind == "rising":
         sleeve = 0.62 * top
         inner = 0.7 * radius
         base += ring((0, 0, 0.5 * (low + sleeve)), UP, inner + GAP, radius + GAP, sleeve - low, 16)
-        base += cylinder((0, 0, foot + 0.01), (0, 0, low + 0.01), radius + GAP)
+        base += rod(0, 0, (foot + 0.01, low + 0.01), radius + GAP)
         travel = rng.uniform(0.3, 0.6) * (sleeve - low)
-        rod = cylinder((0, 0, sleeve - travel - 0.05), (0, 0, top + 0.002), inner, sections=16)
-        table.add_numbered("top", rod + slab(top), prismatic("body", UP, 0.0, travel, (0, 0, top)))
+        pole = rod(0, 0, (sleeve - travel - 0.05, top + 0.002), inner, sections=16)
+        table.add_numbered("top", pole + slab(top), prismatic("body", UP, 0.0, travel, (0, 0, top)))
     elif kind == "turning":
-        base += cylinder((0, 0, foot + 0.01), (0, 0, top - GAP), radius)
-        base += cylinder((0, 0, top - 0.02 - GAP), (0, 0, top - GAP), min(3 * radius, 0.5 * wide))
+        base += rod(0, 0, (foot + 0.01, top - GAP), radius)
+        base += rod(0, 0, (top - 0.02 - GAP, top - GAP), min(3 * radius, 0.5 * wide))
         table.add_numbered("top", slab(top), swivel("body", UP, (0, 0, top), None if rng.random() < 0.6 else 1.57))
     else:
-        base += cylinder((0, 0, foot + 0.01), (0, 0, top - 0.05), radius)
+        base += rod(0, 0, (foot + 0.01, top - 0.05), radius)
         base += box((-radius, 0.5 * radius), radius, (top - 0.06, top - 0.02))
         hinge = (radius + 0.01, 0.0, top - 0.03)
         lugs = union(

@@ -10,7 +10,7 @@ from artsim.families import fronts
 from artsim.families.fronts import Cell, Moving, Style
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import Vector, about
-from artsim.making.solids import Solid, box, cylinder, hull_of, tube, union
+from artsim.making.solids import Solid, box, cylinder, hull_of, rod, tube, union
 
 GAP = 0.003
 
@@ -186,7 +186,7 @@ def wheels(table: Assembly, spots: list[tuple[float, float]], height: float, siz
         for s in (-1, 1):
             a, b = sorted((y + s * (half + 0.002), y + s * (half + 0.002 + thick)))
             body += box((x - 0.35 * radius, x + 0.35 * radius), (a, b), (0.7 * radius, height))
-        body += cylinder((x, y, height - 0.001), (x, y, height + 0.01), 0.4 * size, sections=12)
+        body += rod(x, y, (height - 0.001, height + 0.01), 0.4 * size, sections=12)
         table.body += body
-        wheel = cylinder((x, y - half, radius), (x, y + half, radius), radius, sections=18)
+        wheel = rod(x, (y - half, y + half), radius, radius, sections=18)
         table.add_numbered("wheel", wheel, continuous("body", (0, 1, 0), (x, y, radius)))

@@ -11,7 +11,7 @@ import numpy as np
 from artsim.families.details import dial, push_button
 from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
 from artsim.making.outlines import about, rounded_rectangle
-from artsim.making.solids import Solid, box, cylinder, frame, hull_of, posts, prism, tube, union
+from artsim.making.solids import Solid, box, frame, hull_of, posts, prism, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.001
@@ -124,7 +124,7 @@ def _lever_style(rng: Rng) -> Solid:
     if kind == 1:
         tip = box((-0.034, -0.028), half, 0.004, fillet=0.0015)
         return solid + hull_of(tip, box((-0.012, -0.006), 0.6 * half, 0.009, fillet=0.0015))
-    return solid + cylinder((-0.006, 0, 0), (-0.026, 0, 0), 0.5 * half + 0.003, 0.6 * half + 0.004, 18)
+    return solid + rod((-0.006, -0.026), 0, 0, 0.5 * half + 0.003, 0.6 * half + 0.004, 18)
 
 
 def _controls(rng: Rng, toaster: Assembly, places: list[float], half: float, top: float, foot: float) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from artsim.making.assembly import Assembly, JointSpec, Rng, pick, prismatic, revolute
 from artsim.making.outlines import about, lifted, superellipse
-from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, tray, tube, union
+from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, rod, tray, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -230,7 +230,7 @@ def _high_cistern(rng: Rng, moving: list[Moving], back: float, height: float) ->
     long = rng.uniform(0.3, 0.55) * up + 0.2
     top = low + 0.6 * tall - GAP
     chain = tube([(x, y, top), (x, y, top - long)], 0.0035, 8)
-    chain += cylinder((x, y, top - long - 0.06), (x, y, top - long + 0.005), 0.013, 0.008, 14)
+    chain += rod(x, y, (top - long - 0.06, top - long + 0.005), 0.013, 0.008, 14)
     moving.append(("chain", chain, prismatic("body", (0, 0, -1), 0.0, rng.uniform(0.04, 0.1), (x, y, top))))
     return solid
 
@@ -276,20 +276,20 @@ def _seat_and_lid(
     for y in (-apart, apart):
         near, far = y - half / 2 + 0.001, y + half / 2 - 0.001
         seat += box((edge - 0.06, axis_x), (near, far), (low + 0.15 * cover.thick, low + 0.85 * cover.thick))
-        seat += cylinder((axis_x, near, at), (axis_x, far, at), round_off, sections=14)
+        seat += rod(axis_x, (near, far), at, round_off, sections=14)
     lid = _lid(rng, long, wide, power, top + GAP, cover.lid)
     for y in (-apart - half, apart + half):  # arms from the plate down to the axis, beside the seat's
         near, far = y - half / 2 + 0.001, y + half / 2 - 0.001
         arm = box((edge - 0.07, axis_x), (near, far), (top + GAP, top + GAP + 0.5 * cover.lid))
         lid += arm + hull_of(
-            cylinder((axis_x, near, at), (axis_x, far, at), 0.3 * cover.thick, sections=14),
+            rod(axis_x, (near, far), at, 0.3 * cover.thick, sections=14),
             box((axis_x - 0.01, axis_x), (near, far), (top + GAP, top + GAP + 0.5 * cover.lid)),
         )
     hinge = (axis_x, 0.0, at)
     kind = pick(rng, {"both": 0.45, "in step": 0.2, "lid": 0.25, "seat": 0.1})
     if kind == "lid":
         stops = union(
-            cylinder((0.3 * length, y, height - 0.002), (0.3 * length, y, low + 0.002), 0.01, sections=10)
+            rod(0.3 * length, y, (height - 0.002, low + 0.002), 0.01, sections=10)
             for y in (-0.36 * width, 0.36 * width)
         )
         return seat + stops, [("lid", lid, revolute("body", BACK, hinge, 0.0, limit))]

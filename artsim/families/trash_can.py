@@ -13,7 +13,7 @@ import numpy as np
 from artsim.families.details import rounded_tray
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, Rng, continuous, pick, revolute
-from artsim.making.solids import Solid, box, cylinder, hull_of, tube, union
+from artsim.making.solids import Solid, box, hull_of, rod, tube, union
 
 GAP = 0.0015
 
@@ -91,7 +91,7 @@ def _pedal_bin(rng: Rng, can: Assembly, body: Solid, size: Bin) -> None:
     lid = rounded_tray((-x - 0.003, -size.y - 0.003, seam), (x + 0.003, size.y + 0.003, seam + rise), 0.003,
                        size.radius, profile, side=-1, steps=size.steps)  # fmt: skip
     lid += box((x - 0.012, hinge[0]), half, (seam, seam + 0.007))
-    lid += cylinder((hinge[0], -half, seam + 0.002), (hinge[0], half, seam + 0.002), 0.006, sections=12)
+    lid += rod(hinge[0], (-half, half), seam + 0.002, 0.006, sections=12)
     if rng.random() < 0.6:  # housing of the hinge
         body += box((x - 0.006 - size.taper, x + 0.014), 0.8 * half, (size.height - 0.14, size.height - 0.02))
     falls = rng.random() < 0.35  # over the back, past the upright, as far as the hinge lets it
@@ -148,7 +148,7 @@ def _two_lids(rng: Rng, can: Assembly, body: Solid, size: Bin) -> None:
         hinge = s * (size.y + 0.009)
         lid = Solid((whole.pieces[0].trim_by_plane((0.0, s, 0.0), GAP),))
         barrel = 0.25 * size.x
-        lid += cylinder((-barrel, hinge, seam + 0.001), (barrel, hinge, seam + 0.001), 0.0045, sections=12)
+        lid += rod((-barrel, barrel), hinge, seam + 0.001, 0.0045, sections=12)
         inner = s * 0.9 * size.y
         lid += box(barrel, (min(hinge, inner), max(hinge, inner)), (seam + 0.0005, seam + 0.005))
         can.add(f"lid_{number}", lid, revolute("body", (-s, 0, 0), (0, hinge, seam), 0.0, limit), density=500.0)
@@ -165,14 +165,14 @@ def _wheelie(rng: Rng) -> Assembly:
     inner = y - 0.6 * taper
     wide = rng.uniform(0.035, 0.05)
     axle = (x - taper + rng.uniform(0.0, 0.4) * wheel, wheel)
-    body += cylinder((axle[0], -inner + 0.001, axle[1]), (axle[0], inner - 0.001, axle[1]), 0.012, sections=16)
+    body += rod(axle[0], (-inner + 0.001, inner - 0.001), axle[1], 0.012, sections=16)
     body += box((x - taper - 0.02, axle[0] + 0.014), 0.6 * y, (axle[1] - 0.03, axle[1] + 0.03))
     front = -x + taper
     body += box((front + 0.002, front + 0.05), 0.6 * y, (0.0, lift + 0.003))
     grip_z, grip_x = height - rng.uniform(0.06, 0.08), x + rng.uniform(0.045, 0.06)
     for s in (-1.0, 1.0):
         body += tube([(x - 0.004, s * 0.7 * y, grip_z - 0.02), (grip_x, s * 0.7 * y, grip_z)], 0.011, 10)
-    body += cylinder((grip_x, -0.75 * y, grip_z), (grip_x, 0.75 * y, grip_z), 0.014, sections=16)
+    body += rod(grip_x, (-0.75 * y, 0.75 * y), grip_z, 0.014, sections=16)
 
     can = Assembly("body", body, 600.0)
     seam = height + GAP
@@ -181,15 +181,13 @@ def _wheelie(rng: Rng) -> Assembly:
     shape = [(0.0, rng.uniform(0.2, 0.9) * rise + 0.02), (0.6, 0.01), (0.62, 0.0), (1.0, 0.0)]
     lid = rounded_tray((-x - 0.02, -y - 0.012, seam), (x, y + 0.012, seam + rise), 0.005, radius, shape, side=-1)
     lid += box((x - 0.02, hinge[0]), 0.6 * y, (seam, seam + 0.009))
-    lid += cylinder((hinge[0], -0.6 * y, seam + 0.002), (hinge[0], 0.6 * y, seam + 0.002), 0.008, sections=12)
+    lid += rod(hinge[0], (-0.6 * y, 0.6 * y), seam + 0.002, 0.008, sections=12)
     limit = np.deg2rad(rng.uniform(75.0, 108.0) if rng.random() < 0.6 else rng.uniform(108.0, 205.0))
     can.add("lid", lid, revolute("body", (0, 1, 0), hinge, 0.0, limit))
     for number, s in enumerate((1.0, -1.0)):
         near, far = s * inner, s * (inner + wide)
-        tyre = cylinder((axle[0], near, wheel), (axle[0], far, wheel), wheel, sections=28)
-        tyre += cylinder(
-            (axle[0], far - s * 0.001, wheel), (axle[0], far + s * 0.008, wheel), 0.45 * wheel, 0.3 * wheel, 20
-        )
+        tyre = rod(axle[0], (near, far), wheel, wheel, sections=28)
+        tyre += rod(axle[0], (far - s * 0.001, far + s * 0.008), wheel, 0.45 * wheel, 0.3 * wheel, 20)
         can.add(
             f"wheel_{number}", tyre, continuous("body", (0, 1, 0), (axle[0], 0.5 * (near + far), wheel)), density=900.0
         )

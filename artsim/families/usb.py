@@ -14,7 +14,7 @@ import numpy as np
 from artsim.families.keys import key_outline, sleeve
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import FRONT, rounded_rectangle
-from artsim.making.solids import Solid, box, cylinder, hull, hull_of, prism, ring, tube, union
+from artsim.making.solids import Solid, box, hull, hull_of, prism, ring, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0004
@@ -120,10 +120,7 @@ def _body(rng: Rng, stick: _Stick, x0: float, x1: float, plain: bool = False) ->
         size = 0.3 * min(span / columns, half)
         for share in (np.arange(columns) + 0.5) / columns:
             x = x0 + (0.12 + 0.76 * share) * span
-            solid += union(
-                cylinder((x, s * 0.42 * half, 0), (x, s * 0.42 * half, thick + 0.6 * size), size, sections=12)
-                for s in (-1, 1)
-            )
+            solid += union(rod(x, s * 0.42 * half, (0, thick + 0.6 * size), size, sections=12) for s in (-1, 1))
     elif extra < 0.6:
         solid += box((x0 + 0.3 * span, x0 + 0.7 * span), 0.5 * half, (0, 1.1 * thick), fillet=0.2 * half, axis=2)
     return solid
@@ -188,7 +185,7 @@ def _swivel(rng: Rng, usb: Assembly, stick: _Stick) -> None:
     cover = prism(outline, low - sheet, low) + prism(outline, high, high + sheet)
     cover += box((pivot - reach - sheet, pivot - reach), wide, (low - sheet, high + sheet))
     for z, out in ((low - sheet, -1.0), (high + sheet, 1.0)):
-        cover += cylinder((pivot, 0, z - out * 0.5 * sheet), (pivot, 0, z + out * 0.0006), pin, sections=16)
+        cover += rod(pivot, 0, (z - out * 0.5 * sheet, z + out * 0.0006), pin, sections=16)
     side = float(rng.choice([-1.0, 1.0]))
     turn = continuous("body", (0, 0, side), (pivot, 0, 0)) if rng.random() < 0.3 else revolute(
         "body", (0, 0, side), (pivot, 0, 0), 0.0, rng.uniform(1.6, 3.3))  # fmt: skip

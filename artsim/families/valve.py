@@ -11,7 +11,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, Rng, continuous, pick, revolute, screw
 from artsim.making.outlines import UP, circle, turns
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, tube
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, rod, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -76,10 +76,10 @@ def _gate_valve(rng: Rng, pipe: float, room: float) -> tuple[Solid, Solid, Array
     solid = ellipsoid((0, 0, 0), (belly, 1.25 * belly, belly * rng.uniform(1.0, 1.3)), 20)
     neck = pipe * rng.uniform(0.7, 0.95)
     seat = belly * rng.uniform(1.2, 1.7)
-    solid += cylinder((0, 0, 0), (0, 0, seat), neck)
+    solid += rod(0, 0, (0, seat), neck)
     wide = neck * rng.uniform(1.35, 1.6)
     thick = pipe * rng.uniform(0.2, 0.3)
-    solid += cylinder((0, 0, seat - thick), (0, 0, seat + thick), wide, sections=24)
+    solid += rod(0, 0, (seat - thick, seat + thick), wide, sections=24)
     for spot in circle((0, 0, seat), UP, 0.5 * (wide + neck), int(rng.choice([4, 6]))):
         solid += cylinder(spot - (0, 0, 1.4 * thick), spot + (0, 0, 1.5 * thick), 0.13 * pipe, sections=6)
     stem = pipe * rng.uniform(0.16, 0.24)
@@ -101,7 +101,7 @@ def _gate_valve(rng: Rng, pipe: float, room: float) -> tuple[Solid, Solid, Array
                            hub - 0.15 * pipe - GAP)], leg, 10)  # fmt: skip
         solid += ring((0, 0, hub - GAP - 0.15 * pipe), UP, bore, bore + 2.5 * leg, 0.3 * pipe, 12)
     wheel = _wheel(rng, hub, min(pipe * rng.uniform(1.5, 2.4), room), stem, pipe)
-    wheel += cylinder((0, 0, bottom + 0.2 * pipe), (0, 0, hub + 0.3 * pipe), stem, sections=16)
+    wheel += rod(0, 0, (bottom + 0.2 * pipe, hub + 0.3 * pipe), stem, sections=16)
     return solid, wheel, np.array([0.0, 0.0, hub]), travel
 
 
@@ -112,8 +112,8 @@ def _wheel(rng: Rng, hub: float, radius: float, stem: float, pipe: float) -> Sol
     level = hub + rim + radius * rng.uniform(0.0, 0.25)
     tall = 0.35 * pipe
     solid = tube(circle((0, 0, level), UP, radius - rim, 18), rim, 8, closed=True)
-    solid += cylinder((0, 0, hub), (0, 0, hub + tall), 2.0 * stem, 1.7 * stem, 16)
-    solid += cylinder((0, 0, hub + tall - 0.001), (0, 0, hub + tall + 0.8 * stem), 1.2 * stem, sections=6)
+    solid += rod(0, 0, (hub, hub + tall), 2.0 * stem, 1.7 * stem, 16)
+    solid += rod(0, 0, (hub + tall - 0.001, hub + tall + 0.8 * stem), 1.2 * stem, sections=6)
     flat = rng.random() < 0.5
     for angle in turns(spokes):
         out = np.array([cos(angle), sin(angle), 0.0])
@@ -134,9 +134,9 @@ def _ball_valve(rng: Rng, pipe: float, room: float) -> tuple[Solid, Solid, Array
     solid = ellipsoid((0, 0, 0), (belly, 1.2 * belly, belly), 18)
     sides = int(rng.choice([6, 8]))
     for side in (-1, 1):
-        solid += cylinder((0, side * 0.5 * belly, 0), (0, side * 1.4 * belly, 0), 1.2 * pipe, sections=sides)
+        solid += rod(0, (side * 0.5 * belly, side * 1.4 * belly), 0, 1.2 * pipe, sections=sides)
     neck, top = 0.45 * pipe, belly + pipe * rng.uniform(0.25, 0.7)
-    solid += cylinder((0, 0, 0), (0, 0, top), neck, sections=18)
+    solid += rod(0, 0, (0, top), neck, sections=18)
     z = top + GAP
     thick, half = rng.uniform(0.003, 0.005), pipe * rng.uniform(0.22, 0.35)
     length = min(pipe * rng.uniform(2.8, 4.2), 2.0 * room - 1.5 * neck)
@@ -153,5 +153,5 @@ def _ball_valve(rng: Rng, pipe: float, room: float) -> tuple[Solid, Solid, Array
     lever += hull_of(b, c)
     if rng.random() < 0.25 and length + 2 * GAP < room:  # a second wing: a butterfly handle
         lever += lever.mirrored(0)
-    lever += cylinder((0, 0, z + 0.5 * thick), (0, 0, z + thick + 0.25 * pipe), 0.35 * pipe, sections=6)
+    lever += rod(0, 0, (z + 0.5 * thick, z + thick + 0.25 * pipe), 0.35 * pipe, sections=6)
     return solid, lever, np.array([0.0, 0.0, top]), 0.0

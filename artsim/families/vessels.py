@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from artsim.common.elementary import cos, power, sin
 from artsim.making.assembly import Rng, pick
 from artsim.making.outlines import UP, about, lifted, turns
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, loft, ring, tube, union
+from artsim.making.solids import Solid, box, ellipsoid, hull_of, loft, ring, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0008
@@ -108,7 +108,7 @@ def cap(
     ]
     if bore > 0:
         return loft(slices) + ring((0, 0, high - 0.5 * wall), UP, bore, min(upper, shoulder), wall, sections)
-    return loft(slices) + cylinder((0, 0, under), (0, 0, high), shoulder, upper, sections)
+    return loft(slices) + rod(0, 0, (under, high), shoulder, upper, sections)
 
 
 def ribs(radius: float, low: float, high: float, count: int, size: float) -> Solid:
@@ -116,7 +116,7 @@ def ribs(radius: float, low: float, high: float, count: int, size: float) -> Sol
     solid = Solid()
     for a in turns(count):
         x, y = radius * cos(a), radius * sin(a)
-        solid += cylinder((x, y, low), (x, y, high), size, sections=6)
+        solid += rod(x, y, (low, high), size, sections=6)
     return solid
 
 
@@ -124,8 +124,7 @@ def dome(radius: float, low: float, rise: float, sections: int = 20) -> Solid:
     """Round cap of a sphere or flatter, on a level circle."""
     levels = ((0.0, 1.0), (0.4, 0.9), (0.75, 0.64), (0.95, 0.3), (1.0, 0.08))
     discs = [
-        cylinder((0, 0, low + h * rise), (0, 0, low + h * rise + 1e-5), max(s * radius, 1e-4), sections=sections)
-        for h, s in levels
+        rod(0, 0, (low + h * rise, low + h * rise + 1e-5), max(s * radius, 1e-4), sections=sections) for h, s in levels
     ]
     return hull_of(*discs)
 
@@ -145,7 +144,7 @@ def pump_head(rng: Rng, low: float, stem: float, size: float, reach: float, down
         How far the nozzle reaches from the axis.
     """
     tall = size * rng.uniform(0.45, 1.3)
-    solid = cylinder((0, 0, low - down), (0, 0, low + 0.5 * tall), stem, sections=14)
+    solid = rod(0, 0, (low - down, low + 0.5 * tall), stem, sections=14)
     kind = pick(rng, ["saddle", "disc", "hook", "block", "drop"])
     droop = rng.uniform(0.0, 0.25)
     r = min(size * rng.uniform(0.3, 0.48), 0.48 * tall)
@@ -160,12 +159,12 @@ def pump_head(rng: Rng, low: float, stem: float, size: float, reach: float, down
     if kind == "hook":
         bend = -reach * rng.uniform(0.75, 0.9)
         path = [(0, 0, middle), (bend, 0, middle + 0.1 * reach), (-reach, 0, middle - max(droop, 0.1) * reach)]
-        return solid + tube(path, [1.2 * r, r, 0.8 * r], 10) + cylinder((0, 0, low), (0, 0, low + tall), size)
+        return solid + tube(path, [1.2 * r, r, 0.8 * r], 10) + rod(0, 0, (low, low + tall), size)
     if kind == "drop":
         back = ellipsoid((0, 0, middle), (size, size, 0.5 * tall), 14)
         return solid + hull_of(back, ellipsoid((-reach, 0, middle - 0.5 * droop * reach), 0.7 * r, 10))
     top = low + tall
-    solid += cylinder((0, 0, low), (0, 0, top), size * rng.uniform(0.5, 0.9), size)
+    solid += rod(0, 0, (low, top), size * rng.uniform(0.5, 0.9), size)
     solid += dome(size, top - 1e-4, 0.25 * tall)
     return solid + tube([(0, 0, middle), (-reach, 0, middle - droop * reach)], [r, 0.8 * r], 10)
 

@@ -9,7 +9,7 @@ from artsim.families.details import rounded_tray
 from artsim.families.wheels import GAP, STEEL, Wheels, bar
 from artsim.making.assembly import Assembly, Rng, pick, revolute
 from artsim.making.outlines import UP, about
-from artsim.making.solids import box, cylinder, hull_of, tube, union
+from artsim.making.solids import box, cylinder, hull_of, rod, tube, union
 
 
 def wagon(rng: Rng) -> Assembly:
@@ -40,12 +40,12 @@ def wagon(rng: Rng) -> Assembly:
     inner = track - 0.5 * wheels.wide - GAP
     z = wheels.radius
     body += box((x_back - 0.02, x_back + 0.02), inner - 0.03, (z - 0.015, floor + 0.002))
-    body += cylinder((x_back, -inner, z), (x_back, inner, z), 0.012, sections=12)
+    body += rod(x_back, (-inner, inner), z, 0.012, sections=12)
     cart = Assembly("body", body, 500.0)
     top = floor - GAP
-    axle = cylinder((x_front, 0, top), (x_front, 0, top - 0.015), 0.4 * half, sections=20)
+    axle = rod(x_front, 0, (top, top - 0.015), 0.4 * half, sections=20)
     axle += box((x_front - 0.02, x_front + 0.02), 0.35 * half, (z - 0.015, top - 0.005))
-    axle += cylinder((x_front, -inner, z), (x_front, inner, z), 0.012, sections=12)
+    axle += rod(x_front, (-inner, inner), z, 0.012, sections=12)
     limit = rng.uniform(0.3, 0.6)
     # Steered all the way and turned up, the drawbar stays in front of the tray's lower edge.
     rise, ahead = floor - z, (x_front + 0.5 * length + 0.04) / cos(limit)
@@ -107,7 +107,7 @@ def hand_cart(rng: Rng) -> Assembly:
     y_wheel = half + flare + 0.5 * wheels.wide + 0.012
     z = wheels.radius
     reach = y_wheel - 0.5 * wheels.wide - GAP
-    body += cylinder((x_axle, -reach, z), (x_axle, reach, z), 0.015, sections=12)
+    body += rod(x_axle, (-reach, reach), z, 0.015, sections=12)
     for s in (-1.0, 1.0):
         body += box(about(x_axle, 0.04), about(s * 0.7 * half, 0.02), (min(z, low) - 0.02, low + 0.002))
     r, reach = rng.uniform(0.012, 0.02), rng.uniform(0.5, 1.1)

@@ -16,7 +16,7 @@ from artsim.families.details import dial, front_handle, holed_plate, push_button
 from artsim.families.proportions import with_tails
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import about
-from artsim.making.solids import Solid, box, cylinder, frame, hull, posts, ring, tray, vessel
+from artsim.making.solids import Solid, box, frame, hull, posts, ring, rod, tray, vessel
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -115,7 +115,7 @@ def _drum(s: Shape, z: float, radius: float, hole: float, plate: float, gap: flo
     """Drum behind the porthole with three paddles; ``gap`` behind the front plate."""
     front, back = plate + gap + 0.008, s.depth - 0.05
     solid = ring((0.5 * (front + back), 0, z), (1, 0, 0), radius - 0.008, radius, back - front, 16)
-    solid += cylinder((back - 0.004, 0, z), (back + 0.01, 0, z), radius, sections=16)
+    solid += rod((back - 0.004, back + 0.01), 0, z, radius, sections=16)
     solid += ring((front + 0.004, 0, z), (1, 0, 0), hole + 0.012, radius - 0.004, 0.008, 16)
     for k in range(3):
         a = 2.0 * np.pi * k / 3 + 0.4
@@ -138,11 +138,11 @@ def _porthole(rng: Rng, z: float, hole: float, outer: float, thick: float, bowl:
     else:
         solid = holed_plate((x0, -outer, z - outer), (x1, outer, z + outer), (0.0, z), 0.97 * glass, 0, 20)
     if closed:
-        solid += cylinder((x0 - 0.004, 0, z), (x1, 0, z), glass, sections=28)
+        solid += rod((x0 - 0.004, x1), 0, z, glass, sections=28)
     else:
-        solid += cylinder((x0 + 0.3 * thick, 0, z), (x1 + 0.002, 0, z), glass * 1.02, sections=28)
+        solid += rod((x0 + 0.3 * thick, x1 + 0.002), 0, z, glass * 1.02, sections=28)
     # The bowl is narrow enough to swing past the rim of the hole.
-    solid += cylinder((x1 - 0.002, 0, z), (x1 + bowl, 0, z), hole - 0.008, 0.78 * hole, 28)
+    solid += rod((x1 - 0.002, x1 + bowl), 0, z, hole - 0.008, 0.78 * hole, 28)
     for side in (-0.35, 0.35):  # hinges
         solid += box((x1 - 0.014, x1), (0.6 * outer, outer + 0.01), (z + side * outer - 0.02, z + side * outer + 0.02))
     y, reach = 0.018 - outer, rng.uniform(0.03, 0.05)
@@ -216,7 +216,7 @@ def _agitator(rng: Rng, center: Array, radius: float, s: Shape) -> Solid:
     solid = vessel([(r, low), (r, high)], 0.006, (*center, 0.0), 16)
     x, y = center
     top = low + (rng.uniform(0.6, 0.85) * (high - low) if rng.random() < 0.5 else 0.05)
-    solid += cylinder((x, y, low + 0.001), (x, y, top), 0.3 * r, 0.15 * r, 16)
+    solid += rod(x, y, (low + 0.001, top), 0.3 * r, 0.15 * r, 16)
     for k in range(4):
         vane = box((x, x + 0.6 * r), (y - 0.01, y + 0.01), (low + 0.001, low + 0.06))
         solid += vane.turned((0, 0, 1), 0.5 * np.pi * k, (x, y, 0))

@@ -7,7 +7,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, Rng, continuous, pick
 from artsim.making.outlines import UP, Vector, about, turns
-from artsim.making.solids import Solid, box, cylinder, hull_of, ring, tube
+from artsim.making.solids import Solid, box, cylinder, hull_of, ring, rod, tube
 
 GAP = 0.003
 STEEL = 1500.0  # kg/m^3, as real tubes are hollow
@@ -51,7 +51,7 @@ class Wheels:
         for s in (-1.0, 1.0):
             y0, y1 = sorted((y + s * (0.5 * self.wide + 0.003), y + s * (0.5 * self.wide + 0.007)))
             plate = box((x - 0.7 * r, x + 0.7 * r), (y0, y1), (top - 0.006, top))
-            solid += hull_of(plate, cylinder((x, y0, r), (x, y1, r), 0.3 * r, sections=8))
+            solid += hull_of(plate, rod(x, (y0, y1), r, 0.3 * r, sections=8))
         lid = max(2.0 * r + GAP, top - 0.006)
         return solid + box(about(x, 0.7 * r), (y - 0.5 * self.wide - 0.007, y + 0.5 * self.wide + 0.007), (lid, top))
 
@@ -67,12 +67,12 @@ class Wheels:
         axle = np.array([x + trail, y, self.radius])
         disc = top - GAP
         cheek = 0.5 * self.wide + 0.002
-        fork = cylinder((x, y, disc - plate), (x, y, disc), max(0.5 * self.radius, cheek), sections=12)
+        fork = rod(x, y, (disc - plate, disc), max(0.5 * self.radius, cheek), sections=12)
         for s in (-1.0, 1.0):
             y0, y1 = sorted((y + s * cheek, y + s * (cheek + 0.003)))
             fork += hull_of(
                 box((x - 0.3 * self.radius, x + 0.4 * self.radius), (y0, y1), (disc - plate, disc - plate + 0.004)),
-                cylinder((axle[0], y0, axle[2]), (axle[0], y1, axle[2]), 0.3 * self.radius, sections=8),
+                rod(axle[0], (y0, y1), axle[2], 0.3 * self.radius, sections=8),
             )
             fork += box((x - 0.3 * self.radius, x + 0.4 * self.radius), (y0, y1), (disc - plate, disc - 0.001))
         name = f"caster_{self.count}"

@@ -21,6 +21,9 @@ from artsim.common.products import apply, dot, unit
 from artsim.making.outlines import Span, Vector, circle, ends, frame_about, rotation_about, rounded_rectangle
 from artsim.model.kinematics import Array
 
+Along = float | tuple[float, float]
+"""Where something is along an axis, or its two ends."""
+
 
 @dataclass(frozen=True, eq=False)
 class Solid:
@@ -166,6 +169,17 @@ def cylinder(start: Vector, end: Vector, radius: float, end_radius: float | None
     direction = np.asarray(end, dtype=np.float64) - start
     rings = [circle(start, direction, radius, sections), circle(end, direction, far, sections)]
     return hull(np.concatenate(rings))
+
+
+def rod(x: Along, y: Along, z: Along, radius: float, end_radius: float | None = None, sections: int = 24) -> Solid:
+    """Cylinder, cone or frustum along a coordinate axis: the one whose two ends are given, from the first to the other.
+
+    Examples
+    --------
+    >>> rod(0.1, (-0.2, 0.2), 0.3, 0.01)  # an axle along Y
+    """
+    start, end = zip(*(v if isinstance(v, tuple) else (v, v) for v in (x, y, z)), strict=True)
+    return cylinder(start, end, radius, end_radius, sections)
 
 
 def ellipsoid(center: Vector, radii: Vector | float, sections: int = 16) -> Solid:
