@@ -7,8 +7,6 @@ screen that swings out at the back or at the side, a back that opens, a door at 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin
@@ -22,16 +20,23 @@ GAP = 0.0005
 DENSITY = 900.0
 
 
-@dataclass(frozen=True)
 class Shell:
     """Half width, depth and height of a body with its front at x = 0; place and largest radius of the lens; metres."""
 
-    half: float
-    depth: float
-    height: float
-    lens_y: float
-    lens_z: float
-    lens_radius: float
+    def __init__(self, rng: Rng, kind: str) -> None:
+        # Half width; height and depth over it.
+        half, tall, deep = {
+            "compact": (rng.uniform(0.042, 0.06), (1.05, 1.45), (0.35, 0.75)),
+            "reflex": (rng.uniform(0.055, 0.08), (1.15, 1.6), (0.5, 0.95)),
+            "rangefinder": (rng.uniform(0.055, 0.075), (1.0, 1.35), (0.4, 0.65)),
+            "instant": (rng.uniform(0.05, 0.075), (1.3, 2.1), (0.6, 1.3)),
+        }[kind]
+        self.half, self.height, self.depth = half, half * rng.uniform(*tall), half * rng.uniform(*deep)
+        radius = self.height * (rng.uniform(0.24, 0.4) if kind != "instant" else rng.uniform(0.18, 0.3))
+        y = half * rng.choice([0.0, rng.uniform(-0.35, 0.1)])
+        self.lens_y = float(np.clip(y, -half + radius + 0.004, half - radius - 0.014))
+        self.lens_z = self.height * rng.uniform(0.42, 0.52)
+        self.lens_radius = min(radius, self.lens_z - 0.002)
 
 
 def build(rng: Rng) -> Assembly:
@@ -43,7 +48,7 @@ def build(rng: Rng) -> Assembly:
         return _camcorder(rng)
     if kind == "swivel":
         return _swivel(rng)
-    shell = _shell(rng, kind)
+    shell = Shell(rng, kind)
     body, top = _body(rng, shell, kind)
     styles = {"compact": ["tubes"], "instant": ["tubes", "prime"]}
     style = pick(rng, styles.get(kind, ["tubes", "prime", "zoom", "zoom"]))
@@ -55,20 +60,6 @@ def build(rng: Rng) -> Assembly:
     if kind != "compact" and top[1] - top[0] > 0.01 and rng.random() < 0.5:
         _flash(rng, camera, shell, top)
     return camera
-
-
-def _shell(rng: Rng, kind: str) -> Shell:
-    half = {"compact": rng.uniform(0.042, 0.06), "reflex": rng.uniform(0.055, 0.08),
-            "rangefinder": rng.uniform(0.055, 0.075), "instant": rng.uniform(0.05, 0.075)}[kind]  # fmt: skip
-    tall = {"compact": (1.05, 1.45), "reflex": (1.15, 1.6), "rangefinder": (1.0, 1.35), "instant": (1.3, 2.1)}[kind]
-    height = half * rng.uniform(*tall)
-    share = {"compact": (0.35, 0.75), "reflex": (0.5, 0.95), "rangefinder": (0.4, 0.65), "instant": (0.6, 1.3)}[kind]
-    depth = half * rng.uniform(*share)
-    radius = height * (rng.uniform(0.24, 0.4) if kind != "instant" else rng.uniform(0.18, 0.3))
-    y = half * rng.choice([0.0, rng.uniform(-0.35, 0.1)])
-    y = float(np.clip(y, -half + radius + 0.004, half - radius - 0.014))
-    z = height * rng.uniform(0.42, 0.52)
-    return Shell(half, depth, height, y, z, min(radius, z - 0.002))
 
 
 def _body(rng: Rng, shell: Shell, kind: str) -> tuple[Solid, tuple[float, float, float]]:
@@ -235,10 +226,10 @@ def _camcorder(rng: Rng) -> Assembly:
     """A long body with a screen at its left side, a strap at its right, and a viewfinder at the back."""
     half, height = rng.uniform(0.022, 0.045), rng.uniform(0.05, 0.085)
     depth = rng.uniform(0.09, 0.2)
-    shell = Shell(half, depth, height, 0.0, height * rng.uniform(0.5, 0.62), min(half, 0.38 * height) * 0.92)
+    lens_z = height * rng.uniform(0.5, 0.62)
     body = box((0, -half, 0), (depth, half, height), fillet=rng.uniform(0.1, 0.6) * half,
                        axis=[None, 0, 1][int(rng.integers(3))])  # fmt: skip
-    lens = Lens(rng, (0.0, 0.0, shell.lens_z), shell.lens_radius, pick(rng, ["tubes", "prime", "zoom"]))
+    lens = Lens(rng, (0.0, 0.0, lens_z), min(half, 0.38 * height) * 0.92, pick(rng, ["tubes", "prime", "zoom"]))
     if rng.random() < 0.5:  # a handle on top
         x0, x1, z = 0.1 * depth, 0.85 * depth, height + rng.uniform(0.02, 0.04)
         r = rng.uniform(0.004, 0.008)

@@ -7,7 +7,6 @@ door stands), the thickness of the wall, handles and how far the leaf opens vary
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -24,18 +23,23 @@ PROUD = 0.014
 """Metres by which the hinges' axis stands before the leaf, so that the leaf clears the frame."""
 
 
-@dataclass(frozen=True)
 class Style:
     """What the leaves of a door share; metres, positions in Y as shares of a leaf's width."""
 
-    thickness: float
-    stile: float
-    columns: int
-    rows: tuple[float, ...]  # heights of the crossbars, as shares of a leaf's height
-    board: float  # thickness of the boards or panes
-    raised: bool
-    handle: str
-    handle_z: float
+    def __init__(self, rng: Rng, kind: str) -> None:
+        look = pick(rng, {"flush": 0.3, "panels": 0.4, "glass": 0.2, "half": 0.1})
+        self.thickness = rng.uniform(0.035, 0.05)
+        self.rows: tuple[float, ...] = ()  # heights of the crossbars, as shares of a leaf's height
+        if look != "flush":
+            self.rows = pick(rng, ((), (0.45,), (0.42, 0.5), (0.3, 0.62), (0.4, 0.75), (0.2, 0.4, 0.6, 0.8)))
+        self.stile = rng.uniform(0.085, 0.14)
+        self.columns = int(rng.choice([1, 2, 3] if look == "glass" else [1, 2])) if look != "flush" else 1
+        # Thickness of the boards or panes.
+        self.board = {"flush": self.thickness, "panels": 0.012, "glass": 0.006, "half": 0.012}[look]
+        self.raised = look == "panels" and rng.random() < 0.6
+        handles = {"lever": 0.42, "knob": 0.3, "pull": 0.13, "none": 0.15}
+        self.handle = "pull" if kind == "sliding" else pick(rng, handles)
+        self.handle_z = rng.uniform(0.95, 1.1)
 
 
 def build(rng: Rng) -> Assembly:
@@ -44,7 +48,7 @@ def build(rng: Rng) -> Assembly:
     width = rng.uniform(0.5, 1.4) * (1.0 if kind == "single" else rng.uniform(1.5, 1.9))
     height = rng.uniform(1.6, 3.0)
     depth, jamb = with_tails(rng, (0.07, 0.42), (0.07, 0.75), 0.15), rng.uniform(0.03, 0.25)
-    style = _style(rng, kind)
+    style = Style(rng, kind)
     door = Assembly(density=700.0)
     door.record(handles=True)
     if kind == "sliding":
@@ -96,27 +100,6 @@ def _sliding(rng: Rng, door: Assembly, body: Solid, width: float, height: float,
     for number, (leaf, side, center) in enumerate(leaves):
         name = "door" if fixed else f"door_{number}"
         door.add(name, leaf, prismatic("frame", (0, -side, 0), 0.0, travel, tuple(center)), label="door", density=500.0)
-
-
-def _style(rng: Rng, kind: str) -> Style:
-    look = pick(rng, {"flush": 0.3, "panels": 0.4, "glass": 0.2, "half": 0.1})
-    thickness = rng.uniform(0.035, 0.05)
-    shares: tuple[float, ...] = ()
-    if look != "flush":
-        layouts: list[tuple[float, ...]] = [(), (0.45,), (0.42, 0.5), (0.3, 0.62), (0.4, 0.75), (0.2, 0.4, 0.6, 0.8)]
-        shares = layouts[int(rng.integers(len(layouts)))]
-    boards = {"flush": thickness, "panels": 0.012, "glass": 0.006, "half": 0.012}
-    handles = {"lever": 0.42, "knob": 0.3, "pull": 0.13, "none": 0.15}
-    return Style(
-        thickness=thickness,
-        stile=rng.uniform(0.085, 0.14),
-        columns=int(rng.choice([1, 2, 3] if look == "glass" else [1, 2])) if look != "flush" else 1,
-        rows=shares,
-        board=boards[look],
-        raised=look == "panels" and rng.random() < 0.6,
-        handle="pull" if kind == "sliding" else pick(rng, handles),
-        handle_z=rng.uniform(0.95, 1.1),
-    )
 
 
 def _frame(rng: Rng, width: float, height: float, depth: float, jamb: float, style: Style, kind: str) -> Solid:

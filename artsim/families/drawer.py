@@ -8,7 +8,6 @@ table as well; open compartments and fronts that do not move; legs, plinths and 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,19 +26,19 @@ _LEAST_SHARES, _MOST_SHARES = (0.148, 0.28, 0.11), (0.84, 0.983, 0.935)
 """Depth, width and height of unusual furniture over its diagonal."""
 
 
-@dataclass(frozen=True)
 class _Style:
     """What all drawers of a piece of furniture share."""
 
-    front: str
-    overlay: bool  # the fronts lie before the case, or within it
-    handle: str
-    size: float  # of the handle, over the front's width
-    reach: float
-    rise: float  # of the handle above the front's middle, over its height
-    side: float  # height of the drawer's sides over its front's
-    length: float  # of the drawer over the case's depth
-    travel: float  # over the drawer's length
+    def __init__(self, rng: Rng) -> None:
+        self.front = pick(rng, {"slab": 0.7, "shaker": 0.15, "raised": 0.1, "planks": 0.05})
+        self.overlay = rng.random() < 0.5  # the fronts lie before the case, or within it
+        self.handle = pick(rng, {"bar": 0.24, "knob": 0.24, "bow": 0.16, "two knobs": 0.08, "none": 0.28})
+        self.size = rng.uniform(0.15, 0.7)  # of the handle, over the front's width
+        self.reach = rng.uniform(0.015, 0.04)
+        self.rise = rng.uniform(-0.2, 0.3)  # of the handle above the front's middle, over its height
+        self.side = rng.uniform(0.6, 0.95)  # height of the drawer's sides over its front's
+        self.length = with_tails(rng, (0.75, 1.0), (0.45, 1.0), 0.15)  # of the drawer over the case's depth
+        self.travel = with_tails(rng, (0.65, 0.97), (0.35, 1.0), 0.3)  # over the drawer's length
 
 
 class _Furniture(Assembly):
@@ -118,23 +117,9 @@ class _Furniture(Assembly):
 
 def build(rng: Rng) -> Assembly:
     """A body with drawers that slide out towards -X, closed at rest."""
-    furniture = _Furniture(_style(rng))
+    furniture = _Furniture(_Style(rng))
     pick(rng, {_chest: 0.45, _table: 0.3, _desk: 0.25})(rng, furniture)
     return furniture
-
-
-def _style(rng: Rng) -> _Style:
-    return _Style(
-        front=pick(rng, {"slab": 0.7, "shaker": 0.15, "raised": 0.1, "planks": 0.05}),
-        overlay=bool(rng.random() < 0.5),
-        handle=pick(rng, {"bar": 0.24, "knob": 0.24, "bow": 0.16, "two knobs": 0.08, "none": 0.28}),
-        size=rng.uniform(0.15, 0.7),
-        reach=rng.uniform(0.015, 0.04),
-        rise=rng.uniform(-0.2, 0.3),
-        side=rng.uniform(0.6, 0.95),
-        length=with_tails(rng, (0.75, 1.0), (0.45, 1.0), 0.15),
-        travel=with_tails(rng, (0.65, 0.97), (0.35, 1.0), 0.3),
-    )
 
 
 def _chest(rng: Rng, furniture: _Furniture) -> None:

@@ -7,8 +7,6 @@ board, fabric, frame), arms, stretchers.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from artsim.common.elementary import arctan2, cos, hypot, sin
@@ -21,13 +19,14 @@ from artsim.model.kinematics import Array
 GAP = 0.004
 
 
-@dataclass(frozen=True)
 class _Bar:
-    """What the frame is made of."""
+    """What the frame is made of: tubes or bars."""
 
-    round: bool
-    thick: float  # half its width along Y
-    deep: float  # half its depth across its length, in the XZ plane
+    def __init__(self, rng: Rng) -> None:
+        self.round = rng.random() < 0.55
+        self.thick = rng.uniform(0.009, 0.014) if self.round else rng.uniform(0.008, 0.014)  # half its width along Y
+        # Half its depth across its length, in the XZ plane.
+        self.deep = self.thick if self.round else rng.uniform(0.012, 0.022)
 
     def between(self, start: Vector, end: Vector) -> Solid:
         """A bar along a line in a plane of constant Y."""
@@ -49,12 +48,6 @@ class _Bar:
 def build(rng: Rng) -> Assembly:
     """A folding chair, unfolded at rest; one sits down facing -X."""
     return pick(rng, {_crossed: 0.45, _under: 0.2, _tip_up: 0.2, _stool: 0.15})(rng)
-
-
-def _bar(rng: Rng) -> _Bar:
-    tubular = rng.random() < 0.55
-    thick = rng.uniform(0.009, 0.014) if tubular else rng.uniform(0.008, 0.014)
-    return _Bar(tubular, thick, thick if tubular else rng.uniform(0.012, 0.022))
 
 
 def _panel(rng: Rng, low: Array, high: Array, axis: int) -> Solid:
@@ -93,7 +86,7 @@ def _panel(rng: Rng, low: Array, high: Array, axis: int) -> Solid:
 
 def _crossed(rng: Rng) -> Assembly:
     """Two pairs of legs that cross; the front legs go on up to the back rest."""
-    bar = _bar(rng)
+    bar = _Bar(rng)
     half = rng.uniform(0.19, 0.27)  # to the middle of the outer bars
     seat_z, spread = rng.uniform(0.4, 0.48), rng.uniform(0.19, 0.27)
     high = rng.uniform(0.74, 1.0)
@@ -171,7 +164,7 @@ def _crossed(rng: Rng) -> Assembly:
 
 def _under(rng: Rng) -> Assembly:
     """A seat whose back folds down on it and whose legs fold up under it."""
-    bar = _bar(rng)
+    bar = _Bar(rng)
     half, depth = rng.uniform(0.2, 0.3), rng.uniform(0.36, 0.5)
     seat_z, thick = rng.uniform(0.25, 0.48), rng.uniform(0.02, 0.04)
     x0, x1 = -0.5 * depth, 0.5 * depth
@@ -267,7 +260,7 @@ def _tip_up(rng: Rng) -> Assembly:
 
 def _stool(rng: Rng) -> Assembly:
     """Two crossed frames; the seat hangs on one of them and rests on the other."""
-    bar = _bar(rng)
+    bar = _Bar(rng)
     half, height = rng.uniform(0.16, 0.26), rng.uniform(0.35, 0.6)
     spread = rng.uniform(0.14, 0.24)
     apart = 2.0 * bar.thick + GAP

@@ -64,7 +64,7 @@ def build(rng: Rng) -> Assembly:
     lid, knob_top = _lid(rng, pot, lid_joint, bow)
     if lid_joint == "hinge":
         body += _lugs(pot)
-    pins = _pins(rng, pot, max(room, knob_top + 0.012))
+    pins = Pins(rng, pot, max(room, knob_top + 0.012))
     if swinging:
         for s in (-1.0, 1.0):
             root, tip = (0, s * 0.6 * pins.reach, pins.z), (0, s * (pins.reach - pins.rod - GAP), pins.z)
@@ -268,22 +268,16 @@ def _bow(rng: Rng, pot: Pot, room: float) -> tuple[Solid, float]:
     return solid, float(np.interp(-1.05 * pot.mouth, x, z)) - 2.0 * r
 
 
-@dataclass(frozen=True)
 class Pins:
     """Where a swinging bow hangs: half distance and height of the pins, height of the bow, radius of its rod."""
 
-    reach: float
-    z: float
-    top: float
-    rod: float
-
-
-def _pins(rng: Rng, pot: Pot, room: float) -> Pins:
-    z = pot.foot + rng.uniform(0.6, 0.9) * (pot.top - pot.foot)
-    widest = max(level[2] for level in pot.levels)
-    wire = rng.uniform(0.003, 0.006)
-    # So wide and so high that it passes around the body wherever it stands.
-    return Pins(widest + wire + 0.004, z, max(room + 2.4 * wire, z + 1.2 * widest + 2.4 * wire) + 0.01, wire)
+    def __init__(self, rng: Rng, pot: Pot, room: float) -> None:
+        self.z = pot.foot + rng.uniform(0.6, 0.9) * (pot.top - pot.foot)
+        widest = max(level[2] for level in pot.levels)
+        self.rod = rng.uniform(0.003, 0.006)
+        # So wide and so high that it passes around the body wherever it stands.
+        self.reach = widest + self.rod + 0.004
+        self.top = max(room + 2.4 * self.rod, self.z + 1.2 * widest + 2.4 * self.rod) + 0.01
 
 
 def _swinging_bow(rng: Rng, kettle: Assembly, pins: Pins, pot: Pot) -> None:

@@ -8,7 +8,6 @@ its outline, rims, strips of media keys; feet that fold out, knobs, rollers, fad
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,24 +32,25 @@ from artsim.model.kinematics import Array
 GAP = 0.0005
 
 
-@dataclass(frozen=True)
 class _Caps:
     """Look of the keys."""
 
-    pitch: float  # distance of two keys
-    height: float
-    travel: float
-    shrink: float  # share by which a cap's top is smaller than its foot
-    fill: float  # share of a cell that the cap takes up
-    kind: str  # outline; see :func:`artsim.families.keys.key_outline`
-    step: float  # by how much each row is higher than the one before it
+    def __init__(self, rng: Rng) -> None:
+        self.pitch = rng.triangular(0.011, 0.018, 0.026)  # distance of two keys
+        tall = rng.random() < 0.5
+        self.height = self.pitch * (rng.uniform(0.35, 0.65) if tall else rng.uniform(0.1, 0.25))
+        self.travel = self.height * rng.uniform(0.2, 0.45)
+        self.shrink = rng.uniform(0.15, 0.4) if tall else rng.uniform(0.0, 0.15)  # of a cap's top against its foot
+        self.kind = pick(rng, {"square": 0.66, "pill": 0.24, "round": 0.1})  # :func:`artsim.families.keys.key_outline`
+        self.step = self.height * rng.uniform(0.0, 0.18) if tall else 0.0  # each row is higher than the one before it
+        self.fill = rng.uniform(0.76, 0.95)  # share of a cell that the cap takes up
 
 
 def build(rng: Rng) -> Assembly:
     """A keyboard; no key is pressed and the feet are folded in at rest."""
     kinds = {"full": 0.2, "compact": 0.2, "numbers": 0.16, "macro": 0.16, "pivot": 0.1, "folding": 0.08, "angled": 0.1}
     kind = pick(rng, kinds)
-    caps = _draw_caps(rng)
+    caps = _Caps(rng)
     keyboard = Assembly(density=900.0)
     if kind in ("pivot", "folding", "angled"):
         {"pivot": _pivot, "folding": _folding, "angled": _angled}[kind](rng, keyboard, caps)
@@ -58,7 +58,7 @@ def build(rng: Rng) -> Assembly:
     layouts = {"full": full_layout, "compact": compact_layout, "numbers": number_layout, "macro": macro_layout}
     groups = layouts[kind](rng)
     if sum(len(group) for group in groups) > 45:
-        caps = replace(caps, kind="square")  # so many round keys would be most of the triangles of a scene
+        caps.kind = "square"  # so many round keys would be most of the triangles of a scene
     size = extent(groups) * caps.pitch
     margin = caps.pitch * rng.uniform(0.15, 1.2, 4)  # right, left, front, back
     if rng.random() < 0.4:
@@ -85,17 +85,6 @@ def build(rng: Rng) -> Assembly:
     if kind in ("full", "compact") and rng.random() < 0.2:
         _wrist_rest(rng, keyboard, low, high, rest, pads + thick)
     return keyboard
-
-
-def _draw_caps(rng: Rng) -> _Caps:
-    pitch = rng.triangular(0.011, 0.018, 0.026)
-    tall = rng.random() < 0.5
-    height = pitch * (rng.uniform(0.35, 0.65) if tall else rng.uniform(0.1, 0.25))
-    travel = height * rng.uniform(0.2, 0.45)
-    shrink = rng.uniform(0.15, 0.4) if tall else rng.uniform(0.0, 0.15)
-    kind = pick(rng, {"square": 0.66, "pill": 0.24, "round": 0.1})
-    step = height * rng.uniform(0.0, 0.18) if tall else 0.0
-    return _Caps(pitch, height, travel, shrink, rng.uniform(0.76, 0.95), kind, step)
 
 
 # --- parts -----------------------------------------------------------------------------------------------------------
@@ -274,7 +263,7 @@ def _pivot(rng: Rng, keyboard: Assembly, caps: _Caps) -> None:
 
 def _folding(rng: Rng, keyboard: Assembly, caps: _Caps) -> None:
     """Two flat halves; the right one folds over the left one."""
-    caps = replace(caps, height=min(caps.height, 0.003), travel=min(caps.travel, 0.0012), step=0.0)
+    caps.height, caps.travel, caps.step = min(caps.height, 0.003), min(caps.travel, 0.0012), 0.0
     groups, half, margin = _half(rng, caps, 0.6)
     thick = rng.uniform(0.004, 0.012)
     axis = thick + caps.height + 2.0 * CLEAR

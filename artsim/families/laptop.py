@@ -7,7 +7,6 @@ number block, touchpad and its buttons, the screen's frame, badges, feet, how fa
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -19,64 +18,49 @@ from artsim.making.solids import Solid, box, frame, hull_of, posts, rod
 GAP = 0.0008
 
 
-@dataclass(frozen=True)
 class _Shape:
     """Main measures. The lid reaches from x = ``front`` to ``back``; the base starts at ``base_front``."""
 
-    width: float
-    depth: float
-    height: float  # of the base
-    lid: float  # height of the lid
-    front: float
-    base_front: float
-    back: float
-    corner: float
-    hinge_x: float
-    hinge_z: float
-    hinge_radius: float
-    tilt: float  # of the base, its front lower, radians
+    def __init__(self, rng: Rng) -> None:
+        self.width = width = rng.uniform(0.18, 0.48)
+        if rng.random() < 0.4:
+            self.depth = width * rng.triangular(0.54, 0.67, 0.9)
+            self.height = max(width * rng.triangular(0.012, 0.035, 0.11), 0.006)  # of the base
+            self.lid = max(width * rng.triangular(0.01, 0.018, 0.055), 0.004)  # height of the lid
+        elif rng.random() < 0.16:  # as thin as tablets
+            self.depth = width * rng.uniform(0.42, 1.12)
+            self.height = max(width * rng.uniform(0.009, 0.025), 0.004)
+            self.lid = max(width * rng.uniform(0.007, 0.018), 0.0028)
+        else:  # netbooks, tablets with a keyboard, thick old ones, square and very wide ones
+            self.depth = width * rng.uniform(0.42, 1.12)
+            self.height = max(width * rng.uniform(0.01, 0.15), 0.006)
+            self.lid = max(width * rng.uniform(0.008, 0.08), 0.004)
+        # The lid turns about a barrel between the two shells, in notches behind both.
+        self.hinge_radius = rng.uniform(0.2, 0.45) * min(self.height, self.lid, 0.009)
+        self.hinge_x = self.depth / 2 + self.hinge_radius * rng.uniform(-0.4, 0.9)
+        self.back = min(self.depth / 2, self.hinge_x - self.hinge_radius - 0.0008)
+        self.front = self.base_front = -self.depth / 2
+        self.tilt, odd = 0.0, rng.random()  # of the base, its front lower, radians
+        if odd < 0.1:  # a flat keyboard dock, propped up by a thick bar at the back
+            self.height, self.tilt = max(width * rng.uniform(0.012, 0.03), 0.005), rng.uniform(0.03, 0.2)
+            self.base_front += rng.uniform(0.05, 0.22) * self.depth
+        elif odd < 0.16:
+            self.base_front += rng.uniform(0.01, 0.2) * self.depth
+        elif odd < 0.3:
+            self.front += rng.uniform(0.005, 0.06) * self.depth
+        self.corner = self.depth * rng.choice([rng.uniform(0.005, 0.03), rng.uniform(0.03, 0.13)])
+        self.hinge_z = self.height + 0.5 * GAP
 
 
 def build(rng: Rng) -> Assembly:
     """A laptop, closed at rest. The lid opens about the Y axis at the back."""
-    shape = _shape(rng)
+    shape = _Shape(rng)
     laptop = Assembly("base", _propped(rng, shape) if shape.tilt else _base(rng, shape), 1400.0)
     opening = np.deg2rad(rng.uniform(88.0, 180.0) if rng.random() < 0.9 else rng.uniform(42.0, 88.0))
     hinge = (shape.hinge_x, 0, shape.hinge_z)
     lid = _lid(rng, shape) + _hinges(rng, shape)
     laptop.add("lid", lid, revolute("base", (0, 1, 0), hinge, 0.0, opening))
     return laptop
-
-
-def _shape(rng: Rng) -> _Shape:
-    width = rng.uniform(0.18, 0.48)
-    if rng.random() < 0.4:
-        depth = width * rng.triangular(0.54, 0.67, 0.9)
-        height = max(width * rng.triangular(0.012, 0.035, 0.11), 0.006)
-        lid = max(width * rng.triangular(0.01, 0.018, 0.055), 0.004)
-    elif rng.random() < 0.16:  # as thin as tablets
-        depth = width * rng.uniform(0.42, 1.12)
-        height = max(width * rng.uniform(0.009, 0.025), 0.004)
-        lid = max(width * rng.uniform(0.007, 0.018), 0.0028)
-    else:  # netbooks, tablets with a keyboard, thick old ones, square and very wide ones
-        depth = width * rng.uniform(0.42, 1.12)
-        height = max(width * rng.uniform(0.01, 0.15), 0.006)
-        lid = max(width * rng.uniform(0.008, 0.08), 0.004)
-    # The lid turns about a barrel between the two shells, in notches behind both.
-    radius = rng.uniform(0.2, 0.45) * min(height, lid, 0.009)
-    hinge_x = depth / 2 + radius * rng.uniform(-0.4, 0.9)
-    back = min(depth / 2, hinge_x - radius - 0.0008)
-    front = base_front = -depth / 2
-    tilt, odd = 0.0, rng.random()
-    if odd < 0.1:  # a flat keyboard dock, propped up by a thick bar at the back
-        height, tilt = max(width * rng.uniform(0.012, 0.03), 0.005), rng.uniform(0.03, 0.2)
-        base_front += rng.uniform(0.05, 0.22) * depth
-    elif odd < 0.16:
-        base_front += rng.uniform(0.01, 0.2) * depth
-    elif odd < 0.3:
-        front += rng.uniform(0.005, 0.06) * depth
-    corner = depth * rng.choice([rng.uniform(0.005, 0.03), rng.uniform(0.03, 0.13)])
-    return _Shape(width, depth, height, lid, front, base_front, back, corner, hinge_x, height + 0.5 * GAP, radius, tilt)
 
 
 def _shell(rng: Rng, low: tuple[float, ...], high: tuple[float, ...], corner: float, side: int) -> Solid:

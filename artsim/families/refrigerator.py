@@ -6,7 +6,6 @@ doors, shelves, crispers; dispenser, feet, round edges, overhanging top.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -20,18 +19,18 @@ from artsim.model.kinematics import Array
 GAP = 0.003
 
 
-@dataclass(frozen=True)
 class Style:
     """What the doors of one refrigerator share; lengths in metres."""
 
-    thick: float
-    corner: float  # radius of the edges
-    wall: float  # of the body
-    bins: float  # how far the bins reach into the body; 0 for none
-    handle: str
-    level: bool  # whether handles lie level along an edge instead of upright
-    reach: float
-    radius: float
+    def __init__(self, rng: Rng) -> None:
+        self.thick = rng.uniform(0.03, 0.075)
+        self.corner = rng.choice([0.003, rng.uniform(0.005, 0.025)])  # radius of the edges
+        self.wall = rng.uniform(0.035, 0.06)  # of the body
+        self.bins = rng.uniform(0.06, 0.1) if rng.random() < 0.7 else 0.0  # how far the bins reach into the body
+        self.handle = pick(rng, {"bar": 0.35, "bow": 0.25, "flat": 0.2, "none": 0.2})
+        self.level = rng.random() < 0.2  # whether handles lie level along an edge instead of upright
+        self.reach = rng.uniform(0.035, 0.06)
+        self.radius = rng.uniform(0.007, 0.013)
 
 
 def build(rng: Rng) -> Assembly:
@@ -43,16 +42,7 @@ def build(rng: Rng) -> Assembly:
     tall = max(rng.uniform(0.5, 0.9), 1.02 * width) if small else rng.uniform(1.35, 1.9)
     half, depth = 0.5 * width, rng.uniform(0.45, 0.6) if small else rng.uniform(0.5, 0.72)
     foot = rng.uniform(0.015, 0.1)
-    style = Style(
-        thick=rng.uniform(0.03, 0.075),
-        corner=rng.choice([0.003, rng.uniform(0.005, 0.025)]),
-        wall=rng.uniform(0.035, 0.06),
-        bins=rng.uniform(0.06, 0.1) if rng.random() < 0.7 else 0.0,
-        handle=pick(rng, {"bar": 0.35, "bow": 0.25, "flat": 0.2, "none": 0.2}),
-        level=bool(rng.random() < 0.2),
-        reach=rng.uniform(0.035, 0.06),
-        radius=rng.uniform(0.007, 0.013),
-    )
+    style = Style(rng)
     # Fronts: side of the hinge (1: at +Y, -1: at -Y, 0: a drawer), then y and z from low to high.
     top, side = foot + tall, int(rng.choice([-1, 1]))
     fronts: list[tuple[int, float, float, float, float]] = []

@@ -7,8 +7,6 @@ and number; a battery cover that slides or swings; a front cover that slides or 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from artsim.common.elementary import exp, sin
@@ -22,18 +20,46 @@ GAP = 0.0005
 MOST_KEYS = 34
 
 
-@dataclass(frozen=True, eq=False)
 class _Body:
     """Cross-sections of the body: x of front and back and half of the width at heights; the keys stand at x = 0."""
 
-    levels: Array
-    fronts: Array
-    backs: Array
-    halves: Array
-    roundness: float
-    key_low: float
-    key_high: float
-    key_half: float
+    def __init__(self, rng: Rng) -> None:
+        length = 0.17 * exp(rng.uniform(-0.75, 0.6))
+        half = 0.5 * length * rng.triangular(0.16, 0.26, 0.62)
+        thick = max(length * rng.triangular(0.035, 0.1, 0.26), 0.006)
+        low, high = rng.uniform(0.06, 0.3), rng.uniform(0.9, 0.96)
+        share = np.unique([*np.linspace(0.0, 1.0, 8), low, high])  # the face between low and high is flat
+        self.levels = levels = length * share
+        kind = pick(rng, {"straight": 0.34, "tapered": 0.24, "waisted": 0.24, "oval": 0.18})
+        amount = rng.uniform(0.12, 0.5)
+        if kind == "tapered":
+            widths = 1.0 - amount * (share if rng.random() < 0.5 else 1.0 - share)
+        elif kind == "waisted":
+            widths = 1.0 - amount * np.square(sin(np.pi * np.clip((share - rng.uniform(0.0, 0.2)) / 0.8, 0.0, 1.0)))
+        elif kind == "oval":
+            widths = np.sqrt(1.0 - (0.9 + 0.08 * amount) * np.square(2.0 * share - 1.0))
+        else:
+            widths = np.ones(len(levels))
+        round_end = rng.uniform(0.0, 0.6) if kind != "oval" else 0.0
+        widths = widths * np.where((levels == 0) | (levels == length), 1.0 - round_end, 1.0)
+        # Ends of the front bend back or forward beyond the keys; the back has humps.
+        bends = rng.uniform(-0.1, 0.3, 2) * length * pick(rng, {0.0: 0.35, 1.0: 0.65})
+        below, above = np.clip((low - share) / low, 0.0, 1.0), np.clip((share - high) / (1 - high), 0.0, 1.0)
+        self.fronts = fronts = bends[0] * low * 2.0 * np.square(below) + 0.15 * bends[1] * np.square(above)
+        hump, spot = rng.uniform(0.0, 1.2) * rng.choice([0.0, 1.0]), rng.uniform(0.1, 0.9)
+        wide = rng.uniform(0.15, 0.4)
+        slim = rng.uniform(0.45, 1.0)
+        depth = thick * (slim + (1.0 - slim) * share + hump * exp(-np.square((share - spot) / wide)))
+        backs = fronts + depth * np.where((levels == 0) | (levels == length), rng.uniform(0.6, 1.0), 1.0)
+        self.backs = np.maximum(backs, np.maximum(fronts, 0.0) + 0.004)
+        self.halves = half * widths
+        roundness = rng.uniform(0.1, 0.95)
+        inside = (share >= low - 1e-9) & (share <= high + 1e-9)
+        # Edges as round as the body is thick leave no room for keys on a narrow one.
+        edge = 0.5 * np.minimum(self.backs - fronts, 2.0 * half * widths)
+        self.roundness = min(roundness, float((0.55 * half * widths / edge)[inside].min()))
+        self.key_low, self.key_high = low * length, high * length
+        self.key_half = float((self.halves - self.roundness * edge)[inside].min()) * rng.uniform(0.82, 0.97)
 
     def at(self, z: float | Array) -> tuple[Array, Array, Array]:
         """Front, back and half width at a height."""
@@ -49,7 +75,7 @@ class _Body:
 
 def build(rng: Rng) -> Assembly:
     """A remote control; no key is pressed and all covers are closed at rest."""
-    body = _draw_body(rng)
+    body = _Body(rng)
     remote = Assembly(density=1100.0)
     covered = _battery_cover(rng, remote, body)
     if not covered:
@@ -60,45 +86,6 @@ def build(rng: Rng) -> Assembly:
     if rng.random() < 0.08:
         _antenna(rng, remote, body)
     return remote
-
-
-def _draw_body(rng: Rng) -> _Body:
-    length = 0.17 * exp(rng.uniform(-0.75, 0.6))
-    half = 0.5 * length * rng.triangular(0.16, 0.26, 0.62)
-    thick = max(length * rng.triangular(0.035, 0.1, 0.26), 0.006)
-    low, high = rng.uniform(0.06, 0.3), rng.uniform(0.9, 0.96)
-    share = np.unique([*np.linspace(0.0, 1.0, 8), low, high])  # the face between low and high is flat
-    levels = length * share
-    kind = pick(rng, {"straight": 0.34, "tapered": 0.24, "waisted": 0.24, "oval": 0.18})
-    amount = rng.uniform(0.12, 0.5)
-    if kind == "tapered":
-        widths = 1.0 - amount * (share if rng.random() < 0.5 else 1.0 - share)
-    elif kind == "waisted":
-        widths = 1.0 - amount * np.square(sin(np.pi * np.clip((share - rng.uniform(0.0, 0.2)) / 0.8, 0.0, 1.0)))
-    elif kind == "oval":
-        widths = np.sqrt(1.0 - (0.9 + 0.08 * amount) * np.square(2.0 * share - 1.0))
-    else:
-        widths = np.ones(len(levels))
-    round_end = rng.uniform(0.0, 0.6) if kind != "oval" else 0.0
-    widths = widths * np.where((levels == 0) | (levels == length), 1.0 - round_end, 1.0)
-    # Ends of the front bend back or forward beyond the keys; the back has humps.
-    bends = rng.uniform(-0.1, 0.3, 2) * length * pick(rng, {0.0: 0.35, 1.0: 0.65})
-    below, above = np.clip((low - share) / low, 0.0, 1.0), np.clip((share - high) / (1 - high), 0.0, 1.0)
-    fronts = bends[0] * low * 2.0 * np.square(below) + 0.15 * bends[1] * np.square(above)
-    hump, spot = rng.uniform(0.0, 1.2) * rng.choice([0.0, 1.0]), rng.uniform(0.1, 0.9)
-    wide = rng.uniform(0.15, 0.4)
-    slim = rng.uniform(0.45, 1.0)
-    depth = thick * (slim + (1.0 - slim) * share + hump * exp(-np.square((share - spot) / wide)))
-    backs = fronts + depth * np.where((levels == 0) | (levels == length), rng.uniform(0.6, 1.0), 1.0)
-    backs = np.maximum(backs, np.maximum(fronts, 0.0) + 0.004)
-    roundness = rng.uniform(0.1, 0.95)
-    inside = (share >= low - 1e-9) & (share <= high + 1e-9)
-    # Edges as round as the body is thick leave no room for keys on a narrow one.
-    edge = 0.5 * np.minimum(backs - fronts, 2.0 * half * widths)
-    roundness = min(roundness, float((0.55 * half * widths / edge)[inside].min()))
-    edge = roundness * edge
-    keys = float((half * widths - edge)[inside].min()) * rng.uniform(0.82, 0.97)
-    return _Body(levels, fronts, backs, half * widths, roundness, low * length, high * length, keys)
 
 
 def _battery_cover(rng: Rng, remote: Assembly, body: _Body) -> bool:

@@ -7,8 +7,6 @@ feet, round edges.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from artsim.common.elementary import cos, hypot, sin
@@ -21,18 +19,21 @@ from artsim.model.kinematics import Array
 GAP = 0.0015
 
 
-@dataclass(frozen=True)
 class Shape:
     """Measures of one safe in metres. The front of its walls is the plane x = 0; the hinge is at +Y."""
 
-    half: float
-    depth: float
-    low: float
-    high: float
-    wall: float
-    thick: float  # of the door
-    inset: bool  # whether the door lies within the walls
-    barrel: float  # radius of the barrels on the hinge axis; 0 for a hidden hinge
+    def __init__(self, rng: Rng, kind: str) -> None:
+        self.half = 0.5 * rng.uniform(*{"small": (0.3, 0.45), "cube": (0.35, 0.6), "tall": (0.45, 0.75)}[kind])
+        height = 2 * self.half * rng.uniform(*{"small": (0.55, 0.85), "cube": (0.9, 1.35), "tall": (1.5, 2.2)}[kind])
+        self.inset = rng.random() < 0.65  # whether the door lies within the walls
+        self.wall = self.half * rng.uniform(0.08, 0.26)
+        self.low = rng.uniform(0.008, 0.06) if rng.random() < 0.65 else 0.0
+        self.high = self.low + height
+        self.depth = self.half * rng.uniform(1.4, 2.3)
+        self.thick = self.half * rng.uniform(0.06, 0.3)  # of the door
+        self.barrel = 0.0  # radius of the barrels on the hinge axis; 0 for a hidden hinge
+        if self.inset and rng.random() < 0.6:
+            self.barrel = float(np.clip(0.3 * self.wall, 0.006, 0.014))
 
     @property
     def door(self) -> tuple[Array, Array]:
@@ -47,30 +48,13 @@ class Shape:
     @property
     def hinge(self) -> tuple[float, float]:
         """x and y of the axis."""
-        if self.inset:
-            return -self.barrel, self.half - self.wall
-        return -GAP, self.half
+        return (-self.barrel, self.half - self.wall) if self.inset else (-GAP, self.half)
 
 
 def build(rng: Rng) -> Assembly:
     """A safe, closed at rest."""
     kind = pick(rng, {"small": 0.35, "cube": 0.35, "tall": 0.3})
-    width = {"small": (0.3, 0.45), "cube": (0.35, 0.6), "tall": (0.45, 0.75)}[kind]
-    half = 0.5 * rng.uniform(*width)
-    height = 2 * half * rng.uniform(*{"small": (0.55, 0.85), "cube": (0.9, 1.35), "tall": (1.5, 2.2)}[kind])
-    inset = bool(rng.random() < 0.65)
-    wall = half * rng.uniform(0.08, 0.26)
-    foot = rng.uniform(0.008, 0.06) if rng.random() < 0.65 else 0.0
-    shape = Shape(
-        half=half,
-        depth=half * rng.uniform(1.4, 2.3),
-        low=foot,
-        high=foot + height,
-        wall=wall,
-        thick=half * rng.uniform(0.06, 0.3),
-        inset=inset,
-        barrel=float(np.clip(0.3 * wall, 0.006, 0.014)) if inset and rng.random() < 0.6 else 0.0,
-    )
+    shape = Shape(rng, kind)
     left = bool(rng.random() < 0.35)
     sign = 1.0 if left else -1.0
 

@@ -9,8 +9,6 @@ round or long, alike or one longer than the other, offset to one side, open fing
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from artsim.common.elementary import arcsin, arctan2, cos, hypot, sin
@@ -24,14 +22,28 @@ _POINTS_TO_Y = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """Quarter turn that takes -X, where blades are built with their points, to +Y, and rings at -Y to -X."""
 
 
-@dataclass(frozen=True)
 class Ring:
-    """A finger ring, in metres, at the +Y side."""
+    """A finger ring at the +Y side, clear of the middle by its bar; the second of two unlike ones is long."""
 
-    center: Array  # (2,)
-    radii: Array  # (2,) of its middle line, along and across
-    turn: float  # angle of its long axis from X
-    egg: float  # by how much it is wider at the back than at the front
+    def __init__(self, rng: Rng, reach: float, bar: float, kind: str, second: bool, plastic: bool) -> None:
+        long = kind != "same" and second
+        along = reach * (rng.uniform(0.27, 0.35) if long else rng.uniform(0.17, 0.27)) * (1.1 if plastic else 1.0)
+        across = min(along, reach * rng.uniform(0.13, 0.2)) if long or rng.random() < 0.5 else along * 0.95
+        self.radii = np.array([along, across])  # of its middle line, along and across
+        self.turn = rng.uniform(0.0, 0.3)  # angle of its long axis from X
+        self.egg = rng.uniform(0.0, 0.35)  # by how much it is wider at the back than at the front
+        half = hypot(along * sin(self.turn), (1 + self.egg) * across * cos(self.turn)) + 0.6 * bar
+        y = half + GAP + reach * rng.uniform(0.0, 0.05)
+        shift = reach * rng.uniform(0.05, 0.12) if kind == "offset" and not second else 0.0
+        self.center = np.array([reach - along - bar - shift, y])
+
+    def loop(self) -> Array:
+        """(22, 2) points of the ring's middle line."""
+        angles = np.linspace(0.0, 2.0 * np.pi, 22, endpoint=False)
+        wide = self.radii[1] * (1 + self.egg * cos(angles))
+        u = np.column_stack([self.radii[0] * cos(angles), wide * sin(angles)])
+        c, s = cos(self.turn), sin(self.turn)
+        return self.center + matmul(u, [[c, s], [-s, c]])
 
 
 def build(rng: Rng) -> Assembly:
@@ -45,7 +57,7 @@ def build(rng: Rng) -> Assembly:
     height = bar * rng.uniform(0.8, 1.3) if plastic else max(bar, 2.6 * sheet)
     reach = length - blade
     kind = pick(rng, {"same": 0.4, "long": 0.4, "offset": 0.2})
-    rings = [_ring(rng, reach, bar, kind, k, plastic) for k in range(2)]
+    rings = [Ring(rng, reach, bar, kind, second, plastic) for second in (False, True)]
     if kind == "same":
         rings[1] = rings[0]
     point = _blade(rng, blade, width)
@@ -97,33 +109,12 @@ def _blade(rng: Rng, length: float, width: float) -> tuple[Array, ...]:
     return tuple(np.concatenate([upper[k : k + 2], lower[k : k + 2]]) for k in range(8))
 
 
-def _ring(rng: Rng, reach: float, bar: float, kind: str, k: int, plastic: bool) -> Ring:
-    """Ring at the +Y side, clear of the middle by its bar."""
-    long = kind != "same" and k == 1
-    along = reach * (rng.uniform(0.27, 0.35) if long else rng.uniform(0.17, 0.27)) * (1.1 if plastic else 1.0)
-    across = min(along, reach * rng.uniform(0.13, 0.2)) if long or rng.random() < 0.5 else along * 0.95
-    turn, egg = rng.uniform(0.0, 0.3), rng.uniform(0.0, 0.35)
-    half = hypot(along * sin(turn), (1 + egg) * across * cos(turn)) + 0.6 * bar
-    y = half + GAP + reach * rng.uniform(0.0, 0.05)
-    shift = reach * rng.uniform(0.05, 0.12) if kind == "offset" and k == 0 else 0.0
-    return Ring(np.array([reach - along - bar - shift, y]), np.array([along, across]), turn, egg)
-
-
-def _loop(ring: Ring, count: int = 22) -> Array:
-    """(count, 2) points of the ring's middle line."""
-    angles = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
-    wide = ring.radii[1] * (1 + ring.egg * cos(angles))
-    u = np.column_stack([ring.radii[0] * cos(angles), wide * sin(angles)])
-    c, s = cos(ring.turn), sin(ring.turn)
-    return ring.center + matmul(u, [[c, s], [-s, c]])
-
-
 def _handle(
     ring: Ring, side: float, low: float, sheet: float, width: float, bar: float, height: float, plastic: bool
 ) -> Solid:
     """Ring and the shank that joins it to the pivot; half as thick as both blades near the pivot."""
     middle, tang = sheet + GAP / 2, 0.42 * width
-    loop = _loop(ring)
+    loop = ring.loop()
     path = np.column_stack([loop[:, 0], side * loop[:, 1], np.full(len(loop), middle)])
     sections = _sections(path, bar, height)
     solid = loft(sections, closed=True)
@@ -170,7 +161,7 @@ def _sections(path: Array, width: float, height: float) -> list[Array]:
 
 def _finger_rest(ring: Ring, length: float, bar: float, middle: float) -> Solid:
     """Curved hook behind the ring, as hairdressers' scissors have it."""
-    loop = _loop(ring)
+    loop = ring.loop()
     start = loop[np.argmax(loop[:, 0])]
     share = np.linspace(0.0, 1.0, 6)
     path = np.column_stack([start[0] + length * share, start[1] + 0.5 * length * np.square(share), np.full(6, middle)])

@@ -7,8 +7,6 @@ cheeks at the hinge, a rubber pad, and how far each opens.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin
@@ -23,39 +21,29 @@ SKIRT = 0.0016
 """Thickness of the arm's sides beside the magazine."""
 
 
-@dataclass(frozen=True)
 class Layout:
     """Measures in metres. The hinge lies at x = 0, the front at x = -length."""
 
-    length: float  # from the hinge to the front of the arm
-    width: float  # of the magazine
-    base: float  # height of the base
-    hinge: float  # height of the hinge
-    tail: float  # radius of what turns about the hinge
-    magazine: float  # height of the magazine's top
-    inside: float  # from the middle to a cheek beside the hinge
-    run: float  # by how far the cheeks reach forward
-    back: float  # rear end of the base
+    def __init__(self, rng: Rng) -> None:
+        self.length = rng.uniform(0.065, 0.25)  # from the hinge to the front of the arm
+        self.width = rng.uniform(0.009, 0.018)  # of the magazine
+        self.base = rng.uniform(0.004, 0.011) if rng.random() < 0.75 else self.length * rng.uniform(0.06, 0.16)
+        self.tail = rng.uniform(0.0065, 0.01)  # radius of what turns about the hinge
+        self.hinge = self.base + self.tail + rng.uniform(0.001, 0.004)  # height of the hinge
+        self.magazine = self.hinge + rng.uniform(0.3, 0.6) * self.tail  # height of the magazine's top
+        self.inside = 0.5 * self.width + SKIRT + 2 * GAP  # from the middle to a cheek beside the hinge
+        self.run = rng.uniform(1.2, 2.5) * self.tail  # by how far the cheeks reach forward
+        kind = rng.random()
+        if kind < 0.45:  # the base hardly reaches behind the hinge
+            self.back = self.tail * rng.uniform(0.5, 0.8)
+        else:  # or a little, or as a long plate
+            self.back = self.tail * rng.uniform(1.0, 2.2) if kind < 0.8 else self.length * rng.uniform(0.1, 1.1)
 
 
 def build(rng: Rng) -> Assembly:
     """A stapler, closed at rest; what turns about the hinge opens upwards."""
-    length = rng.uniform(0.065, 0.25)
-    width = rng.uniform(0.009, 0.018)
-    base = rng.uniform(0.004, 0.011) if rng.random() < 0.75 else length * rng.uniform(0.06, 0.16)
-    tail = rng.uniform(0.0065, 0.01)
-    hinge = base + tail + rng.uniform(0.001, 0.004)
-    lay = Layout(
-        length=length,
-        width=width,
-        base=base,
-        hinge=hinge,
-        tail=tail,
-        magazine=hinge + rng.uniform(0.3, 0.6) * tail,
-        inside=0.5 * width + SKIRT + 2 * GAP,
-        run=rng.uniform(1.2, 2.5) * tail,
-        back=_back(rng, length, tail),
-    )
+    lay = Layout(rng)
+    length, width = lay.length, lay.width
     arm_width = max(width * rng.uniform(1.25, 2.6), 2 * lay.inside)
     if rng.random() < 0.15:  # short and wide, like those for a schoolbag
         arm_width = min(arm_width * rng.uniform(1.4, 2.1), 0.5 * length)
@@ -63,7 +51,7 @@ def build(rng: Rng) -> Assembly:
     magazine, arm = _magazine(rng, lay), _arm(rng, lay, arm_width)
     widest = _opening(arm, lay)
     wide = min(np.deg2rad(with_tails(rng, (80, 125), (80, 206), 0.45)), widest)
-    axis, origin = (0, 1, 0), (0, 0, hinge)
+    axis, origin = (0, 1, 0), (0, 0, lay.hinge)
     if rng.random() < 0.55:
         lift = min(np.deg2rad(rng.uniform(12, 50)), 0.5 * wide)
         stapler.add("magazine", magazine, revolute("base", axis, origin, 0.0, lift), density=3500.0)
@@ -72,14 +60,6 @@ def build(rng: Rng) -> Assembly:
         joined = box((-0.9 * length, 0), 0.3 * width, (lay.magazine - 0.001, lay.magazine + 0.002))
         stapler.add("arm", magazine + joined + arm, revolute("base", axis, origin, 0.0, wide))
     return stapler
-
-
-def _back(rng: Rng, length: float, tail: float) -> float:
-    """How far the base reaches behind the hinge: hardly, a little, or as a long plate."""
-    kind = rng.random()
-    if kind < 0.45:
-        return float(tail * rng.uniform(0.5, 0.8))
-    return float(tail * rng.uniform(1.0, 2.2) if kind < 0.8 else length * rng.uniform(0.1, 1.1))
 
 
 def _opening(solid: Solid, lay: Layout) -> float:

@@ -6,8 +6,6 @@ halves at the sides. A pedal follows the lid; wheelie bins have two wheels and a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from artsim.families.details import rounded_tray
@@ -18,17 +16,19 @@ from artsim.making.solids import Solid, box, hull_of, rod, tube, union
 GAP = 0.0015
 
 
-@dataclass(frozen=True)
 class Bin:
     """Half depth, half width and height of a bin, radius of its corners, how much it narrows below; metres."""
 
-    x: float
-    y: float
-    height: float
-    radius: float
-    taper: float
-    foot: float  # height of the base
-    steps: int
+    def __init__(self, rng: Rng) -> None:
+        self.x, self.y = rng.uniform(0.09, 0.24), rng.uniform(0.09, 0.28)
+        self.height = min(with_tails(rng, (1.3, 4.2), (0.9, 4.5), 0.2) * max(self.x, self.y), 0.8)
+        if rng.random() < 0.15:  # slim and tall
+            (self.x, self.y), self.height = rng.uniform(0.06, 0.1, 2), rng.uniform(0.55, 1.0)
+        self.radius, self.steps = rng.uniform(0.015, 0.5) * min(self.x, self.y), 3
+        if rng.random() < 0.35:  # round
+            self.y, self.radius, self.steps = self.x, 0.999 * self.x, 6
+        self.taper = float(rng.choice([0.0, rng.uniform(0.02, 0.16)])) * min(self.x, self.y)
+        self.foot = rng.uniform(0.02, 0.05)  # height of the base
 
 
 def build(rng: Rng) -> Assembly:
@@ -36,7 +36,7 @@ def build(rng: Rng) -> Assembly:
     kind = pick(rng, {"pedal": 0.45, "swing": 0.2, "wheelie": 0.2, "halves": 0.15})
     if kind == "wheelie":
         return _wheelie(rng)
-    size = _size(rng)
+    size = Bin(rng)
     can = Assembly()
     body = _body(rng, size)
     if kind == "swing":
@@ -46,25 +46,6 @@ def build(rng: Rng) -> Assembly:
     else:
         _pedal_bin(rng, can, body, size)
     return can
-
-
-def _size(rng: Rng) -> Bin:
-    x, y = rng.uniform(0.09, 0.24), rng.uniform(0.09, 0.28)
-    height = min(with_tails(rng, (1.3, 4.2), (0.9, 4.5), 0.2) * max(x, y), 0.8)
-    if rng.random() < 0.15:  # slim and tall
-        (x, y), height = rng.uniform(0.06, 0.1, 2), rng.uniform(0.55, 1.0)
-    radius = rng.uniform(0.015, 0.5) * min(x, y)
-    if round_one := rng.random() < 0.35:
-        y, radius = x, 0.999 * x
-    return Bin(
-        x=x,
-        y=y,
-        height=height,
-        radius=radius,
-        taper=float(rng.choice([0.0, rng.uniform(0.02, 0.16)])) * min(x, y),
-        foot=rng.uniform(0.02, 0.05),
-        steps=6 if round_one else 3,
-    )
 
 
 def _body(rng: Rng, size: Bin) -> Solid:
