@@ -7,7 +7,6 @@ wire, tapered, bent ends, sleeves, or slim, on hinges without knuckles), and whi
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -29,17 +28,20 @@ APART = 0.12
 """Share of the glasses whose temples stay each on its own side: their hinges are upright, and their ends may hang."""
 
 
-@dataclass(frozen=True)
 class Front:
     """Measures of the front, metres. The hinges lie at x = 0, the lenses before them."""
 
-    half: float  # from the middle to a hinge
-    ahead: float  # the front lies at x = -ahead in the middle, and further back by wrap at the hinges
-    wrap: float  # the front lies at x = -ahead in the middle, and further back by wrap at the hinges
-    hinge_z: float
-    height: float  # of the temples at the hinges
-    thickness: float  # of the temples at the hinges
-    barrel: float  # radius of the hinges; 0 for those without knuckles, of slim temples
+    def __init__(self, rng: Rng, style: str, outline: Array, rim: float, size: float, flat: bool) -> None:
+        height = rng.uniform(5.0, 13.0 if style == "shield" else 10.0) if flat else rng.uniform(2.2, 4.0)
+        # The front lies at x = -ahead in the middle, and further back by wrap at the hinges.
+        self.wrap = size * (rng.uniform(1.0, 20.0) if style == "shield" else rng.uniform(0.5, 9.0)) * MM
+        low, high = outline[:, 1].min(), outline[:, 1].max()
+        self.half = float(outline[:, 0].max()) + rim + rng.uniform(0.5, 4.0) * MM  # from the middle to a hinge
+        self.ahead = self.wrap + rng.uniform(4.0, 11.0) * MM
+        self.hinge_z = float(high - rng.uniform(0.08, 0.42) * (high - low)) - 0.2 * height * MM
+        self.height = height * MM  # of the temples at the hinges
+        self.thickness = (rng.uniform(2.4, 4.2) if flat else rng.uniform(1.8, 2.6)) * MM
+        self.barrel = rng.uniform(1.0, 1.4) * MM  # radius of the hinges; 0 for those without knuckles, of slim temples
 
     @property
     def slim(self) -> bool:
@@ -61,17 +63,17 @@ def build(rng: Rng) -> Assembly:
     outline[:, 0] += apart / 2 - 0.5 * (outline[:, 0].min() + outline[:, 0].max())
     rim = {"wire": 1.3, "thick": rng.uniform(2.0, 4.5), "half": rng.uniform(1.5, 3.5)}.get(style, 1.0) * MM
     flat = style in ("thick", "shield") or rng.random() < 0.4
-    front = _front(rng, style, outline, rim, size, flat)
+    front = Front(rng, style, outline, rim, size, flat)
 
     depth = max(rim * rng.uniform(0.8, 1.2), 2.2 * MM)
     others = rng.spawn(1)[0]  # so that glasses without slim temples do not depend on how these are drawn
     slim = others.random() < SLIM
     sheet = slim and others.random() < 0.6
     if slim:
-        front = replace(front, thickness=others.uniform(0.9, 2.2) * MM, barrel=0.0)
+        front.thickness, front.barrel = others.uniform(0.9, 2.2) * MM, 0.0
     if sheet:  # as thin as real frames that were modelled as plates
         depth = others.uniform(0.7, 3.2) * MM
-        front = replace(front, wrap=0.0, ahead=0.5 * depth + GAP)
+        front.wrap, front.ahead = 0.0, 0.5 * depth + GAP
     frame = _glass(rng, style, outline, front, rim, depth)
     if style != "shield":
         frame += _bridge(rng, style, outline, front, rim)
@@ -129,21 +131,6 @@ def _outline(rng: Rng) -> Array:
     if kind == "aviator":
         z = z - rng.uniform(0.0, 0.15) * y * np.clip(-z, 0, 1)
     return np.stack([a * y, b * z], axis=1)
-
-
-def _front(rng: Rng, style: str, outline: Array, rim: float, size: float, flat: bool) -> Front:
-    height = rng.uniform(5.0, 13.0 if style == "shield" else 10.0) if flat else rng.uniform(2.2, 4.0)
-    wrap = size * (rng.uniform(1.0, 20.0) if style == "shield" else rng.uniform(0.5, 9.0)) * MM
-    low, high = outline[:, 1].min(), outline[:, 1].max()
-    return Front(
-        half=float(outline[:, 0].max()) + rim + rng.uniform(0.5, 4.0) * MM,
-        ahead=wrap + rng.uniform(4.0, 11.0) * MM,
-        wrap=wrap,
-        hinge_z=float(high - rng.uniform(0.08, 0.42) * (high - low)) - 0.2 * height * MM,
-        height=height * MM,
-        thickness=(rng.uniform(2.4, 4.2) if flat else rng.uniform(1.8, 2.6)) * MM,
-        barrel=rng.uniform(1.0, 1.4) * MM,
-    )
 
 
 def _chains(outline: Array, y: Array) -> tuple[Array, Array]:

@@ -8,8 +8,6 @@ below, on which electric kettles turn or from which they lift. One to three part
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin
@@ -24,14 +22,36 @@ GAP = 0.0015
 DENSITY = 500.0  # kg/m^3, as the pieces are solid and real ones are hollow
 
 
-@dataclass(frozen=True)
 class Pot:
     """Levels of the body, radius of the opening, heights of foot and top; metres."""
 
-    levels: list[Level]
-    mouth: float
-    foot: float
-    top: float
+    def __init__(self, rng: Rng, kind: str, foot: float) -> None:
+        wide = rng.uniform(0.065, 0.12) if kind == "stove" else rng.uniform(0.055, 0.095)
+        share = {"stove": (0.8, 1.7), "electric": (1.7, 3.2), "teapot": (0.9, 1.9)}[kind]
+        height = wide * rng.uniform(*share)
+        shapes = {"stove": ["cone", "drum", "belly", "squat"], "electric": ["cone", "drum", "hourglass", "belly"],
+                  "teapot": ["belly", "ball", "squat", "drum", "pear"]}  # fmt: skip
+        shape = pick(rng, shapes[kind])
+        mouth = rng.uniform(0.45, 0.75)
+        if kind == "electric":
+            mouth = rng.uniform(0.65, 0.9)
+        low = rng.uniform(0.8, 0.97)
+        # Height over the whole, and radius over the widest; the last is the mouth.
+        profile = {
+            "cone": [(0.0, 0.97), (0.05, 1.0), (0.75, 0.5 + 0.5 * mouth), (1.0, mouth)],
+            "drum": [(0.0, low), (0.06, 1.0), (0.8, 1.0), (0.93, 0.5 + 0.5 * mouth), (1.0, mouth)],
+            "belly": [(0.0, 0.75 * low), (0.15, 0.93), (0.4, 1.0), (0.65, 0.95), (0.85, 0.5 + 0.45 * mouth),
+                      (1.0, mouth)],
+            "ball": [(0.0, 0.5), (0.12, 0.76), (0.3, 0.94), (0.5, 1.0), (0.7, 0.94), (0.88, max(0.74, mouth)),
+                     (1.0, min(mouth, 0.6))],
+            "squat": [(0.0, low), (0.1, 0.97), (0.3, 1.0), (0.55, 0.94), (0.8, 0.5 + 0.4 * mouth), (1.0, mouth)],
+            "hourglass": [(0.0, 1.0), (0.3, 0.86), (0.6, 0.82), (1.0, min(0.9, mouth + 0.05))],
+            "pear": [(0.0, 0.8), (0.2, 1.0), (0.4, 0.98), (0.7, 0.72), (0.9, 0.6), (1.0, 0.62)],
+        }[shape]  # fmt: skip
+        self.levels: list[Level] = [
+            (foot + z * height, r * wide, r * wide, 1.0 if z == 1.0 else 0.0) for z, r in profile
+        ]
+        self.mouth, self.foot, self.top = profile[-1][1] * wide, foot, foot + height
 
     def radius(self, z: float) -> float:
         """Half depth at a height."""
@@ -42,7 +62,7 @@ def build(rng: Rng) -> Assembly:
     """A kettle with its lid on at rest; it pours towards -X."""
     kind = pick(rng, {"stove": 0.38, "electric": 0.37, "teapot": 0.25})
     standing = kind == "electric" and rng.random() < 0.6  # on a base of its own
-    pot = _pot(rng, kind, 0.022 if standing else 0.0)
+    pot = Pot(rng, kind, 0.022 if standing else 0.0)
     outline = cross_section(pick(rng, ["round", "round", "round", "octagon", "square"]), rng.uniform(0.0, 0.4))
     body = moulded(pot.levels, outline)
     spout, mouth = _spout(rng, kind, pot)
@@ -84,38 +104,6 @@ def build(rng: Rng) -> Assembly:
     if switch is not None:
         kettle.add(switch[1], switch[2], switch[3], density=900.0)
     return kettle
-
-
-def _pot(rng: Rng, kind: str, foot: float) -> Pot:
-    """Proportions, from the foot up to a rim."""
-    wide = rng.uniform(0.065, 0.12) if kind == "stove" else rng.uniform(0.055, 0.095)
-    share = {"stove": (0.8, 1.7), "electric": (1.7, 3.2), "teapot": (0.9, 1.9)}[kind]
-    height = wide * rng.uniform(*share)
-    shapes = {"stove": ["cone", "drum", "belly", "squat"], "electric": ["cone", "drum", "hourglass", "belly"],
-              "teapot": ["belly", "ball", "squat", "drum", "pear"]}  # fmt: skip
-    shape = pick(rng, shapes[kind])
-    mouth = rng.uniform(0.45, 0.75)
-    if kind == "electric":
-        mouth = rng.uniform(0.65, 0.9)
-    low = rng.uniform(0.8, 0.97)
-    profile = {
-        "cone": [(0.0, 0.97), (0.05, 1.0), (0.75, 0.5 + 0.5 * mouth), (1.0, mouth)],
-        "drum": [(0.0, low), (0.06, 1.0), (0.8, 1.0), (0.93, 0.5 + 0.5 * mouth), (1.0, mouth)],
-        "belly": [(0.0, 0.75 * low), (0.15, 0.93), (0.4, 1.0), (0.65, 0.95), (0.85, 0.5 + 0.45 * mouth), (1.0, mouth)],
-        "ball": [(0.0, 0.5), (0.12, 0.76), (0.3, 0.94), (0.5, 1.0), (0.7, 0.94), (0.88, max(0.74, mouth)),
-                 (1.0, min(mouth, 0.6))],
-        "squat": [(0.0, low), (0.1, 0.97), (0.3, 1.0), (0.55, 0.94), (0.8, 0.5 + 0.4 * mouth), (1.0, mouth)],
-        "hourglass": [(0.0, 1.0), (0.3, 0.86), (0.6, 0.82), (1.0, min(0.9, mouth + 0.05))],
-        "pear": [(0.0, 0.8), (0.2, 1.0), (0.4, 0.98), (0.7, 0.72), (0.9, 0.6), (1.0, 0.62)],
-    }[shape]  # fmt: skip
-    if shape == "hourglass":
-        mouth = min(0.9, mouth + 0.05)
-    elif shape == "ball":
-        mouth = min(mouth, 0.6)
-    elif shape == "pear":
-        mouth = 0.62
-    levels = [(foot + z * height, r * wide, r * wide, 1.0 if z == 1.0 else 0.0) for z, r in profile]
-    return Pot(levels, mouth * wide, foot, foot + height)
 
 
 def _spout(rng: Rng, kind: str, pot: Pot) -> tuple[Solid, tuple[Array, Array, float] | None]:

@@ -6,7 +6,7 @@ buttons; a wheel between them, keys on the side and on top, a ball to turn; the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,16 +22,28 @@ from artsim.model.kinematics import Array
 GAP = 0.0007
 
 
-@dataclass(frozen=True, eq=False)
 class _Dome:
     """The outer shape: height, half width and lateral shift at stations along X, front first."""
 
-    stations: Array
-    heights: Array
-    halves: Array
-    shifts: Array
-    steep: float  # 0 for a round cross-section, 1 for one with upright sides
-    shoulder: float  # share of the height up to which the sides stand upright
+    def __init__(self, rng: Rng) -> None:
+        length = rng.uniform(0.07, 0.14)
+        half = 0.5 * length * rng.triangular(0.4, 0.58, 0.85)
+        height = length * rng.triangular(0.13, 0.32, 0.5)
+        share = np.array([0.0, 0.03, 0.1, 0.22, 0.38, 0.55, 0.72, 0.86, 0.95, 1.0])
+        top = rng.uniform(0.35, 0.8)
+        front, back = rng.uniform(0.3, 0.85), rng.uniform(0.15, 0.8)
+        before, behind = np.maximum(top - share, 0.0) / top, np.maximum(share - top, 0.0) / (1.0 - top)
+        profile = 1.0 - (1.0 - front) * np.square(before) - (1.0 - back) * np.square(behind) * np.sqrt(behind)
+        ends = rng.uniform(0.1, 0.75, 2)
+        near, far = np.maximum(1.0 - share / 0.35, 0.0), np.maximum((share - 0.6) / 0.4, 0.0)
+        widths = 1.0 - ends[0] * np.square(near) - ends[1] * np.square(far)
+        waist = rng.uniform(0.0, 0.2) * rng.choice([0.0, 1.0]) * np.maximum(1.0 - np.square((share - 0.42) / 0.3), 0.0)
+        slant = rng.choice([0.0, rng.uniform(-0.25, 0.25)]) * half
+        self.stations = length * (share - 0.5)
+        self.heights, self.halves = height * profile, half * (widths - waist)
+        self.shifts = slant * np.maximum(1.0 - np.square((share - 0.5) / 0.5), 0.0)
+        self.steep = rng.uniform(0.0, 1.0)  # 0 for a round cross-section, 1 for one with upright sides
+        self.shoulder = rng.uniform(0.15, 0.55)  # share of the height up to which the sides stand upright
 
     def at(self, x: float) -> tuple[float, float, float]:
         """Height, half width and shift at x."""
@@ -75,7 +87,7 @@ class _Dome:
 
 def build(rng: Rng) -> Assembly:
     """A mouse; no button is pressed at rest."""
-    dome = _draw_dome(rng)
+    dome = _Dome(rng)
     parts = _Parts(_roll(rng))
     _shell(rng, parts, dome)
     if parts.turn is not None:
@@ -131,27 +143,6 @@ def _roll(rng: Rng) -> Array | None:
     if rng.random() < 0.86:
         return None
     return rotation_about((1.0, 0.0, 0.0), pick(rng, {-1.0: 0.85, 1.0: 0.15}) * rng.uniform(0.25, 0.85))
-
-
-def _draw_dome(rng: Rng) -> _Dome:
-    length = rng.uniform(0.07, 0.14)
-    half = 0.5 * length * rng.triangular(0.4, 0.58, 0.85)
-    height = length * rng.triangular(0.13, 0.32, 0.5)
-    share = np.array([0.0, 0.03, 0.1, 0.22, 0.38, 0.55, 0.72, 0.86, 0.95, 1.0])
-    top = rng.uniform(0.35, 0.8)
-    front, back = rng.uniform(0.3, 0.85), rng.uniform(0.15, 0.8)
-    before, behind = np.maximum(top - share, 0.0) / top, np.maximum(share - top, 0.0) / (1.0 - top)
-    profile = 1.0 - (1.0 - front) * np.square(before) - (1.0 - back) * np.square(behind) * np.sqrt(behind)
-    ends = rng.uniform(0.1, 0.75, 2)
-    widths = (
-        1.0
-        - ends[0] * np.square(np.maximum(1.0 - share / 0.35, 0.0))
-        - ends[1] * np.square(np.maximum((share - 0.6) / 0.4, 0.0))
-    )
-    waist = rng.uniform(0.0, 0.2) * rng.choice([0.0, 1.0]) * np.maximum(1.0 - np.square((share - 0.42) / 0.3), 0.0)
-    slant = rng.choice([0.0, rng.uniform(-0.25, 0.25)]) * half * np.maximum(1.0 - np.square((share - 0.5) / 0.5), 0.0)
-    return _Dome(length * (share - 0.5), height * profile, half * (widths - waist), slant, rng.uniform(0.0, 1.0),
-                 rng.uniform(0.15, 0.55))  # fmt: skip
 
 
 def _shell(rng: Rng, parts: _Parts, dome: _Dome) -> None:

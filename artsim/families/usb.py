@@ -42,8 +42,7 @@ class _Stick:
 def build(rng: Rng) -> Assembly:
     """A USB stick that lies flat, its connector covered or drawn in at rest."""
     scale = rng.uniform(0.75, 1.9)  # novelty sticks are larger than their connectors ask for
-    plug = _PLUGS[str(rng.choice(list(_PLUGS), p=[0.7, 0.2, 0.1]))]
-    plug = _Plug(*(v * scale * rng.uniform(0.9, 1.15) for v in (plug.reach, plug.half, plug.thick)))
+    plug = _Plug(*(v * scale * rng.uniform(0.9, 1.15) for v in pick(rng, _PLUGS)))
     half = plug.half * rng.uniform(1.25, 2.6)
     thick = plug.thick * rng.triangular(1.4, 1.9, 4.2)
     length = plug.reach * rng.uniform(1.1, 4.2)
@@ -53,11 +52,8 @@ def build(rng: Rng) -> Assembly:
     return usb
 
 
-_PLUGS = {
-    "a": _Plug(0.0135, 0.006, 0.00225),
-    "c": _Plug(0.0075, 0.0042, 0.00125),
-    "micro": _Plug(0.0065, 0.0034, 0.0009),
-}
+_PLUGS = {(0.0135, 0.006, 0.00225): 0.7, (0.0075, 0.0042, 0.00125): 0.2, (0.0065, 0.0034, 0.0009): 0.1}
+"""Measures of the plugs A, C and Micro, and how common they are."""
 
 
 def _plug(plug: _Plug, x: float, sign: float = -1.0) -> Solid:
