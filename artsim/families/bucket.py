@@ -67,20 +67,10 @@ def build(rng: Rng) -> Assembly:
 
 
 def _swing(side: float, path: Array, thick: Array, profile: Array, outer: float, pivot: float, ahead: float) -> float:
-    """Angle from upright, up to which a bail clears the bucket and the ground as it swings to the back or the front.
+    """Angle from upright, up to which a bail clears the bucket and the ground as it swings to a side: 1 +X, -1 -X.
 
-    Parameters
-    ----------
-    side : float
-        1 towards +X, -1 towards -X.
-    path : (N, 3) float
-        Middle line of the bail, upright over the pins.
-    thick : (N,) float
-        Its radius.
-    profile : (M, 2) float
-        Outer radius and height of the bucket.
-    outer : float
-        Distance from the middle plane beyond which there are only the ends of the pins.
+    ``path`` (N, 3) is the middle line of the bail over the pins, ``thick`` (N,) its radius; ``profile`` (M, 2) the
+    outer radius and height of the bucket. Beyond ``outer`` from the middle plane there are only the ends of the pins.
     """
     angles = np.deg2rad(np.arange(60.0, 175.0, 2.0))[:, None]
     arm = path[:, 2] - pivot

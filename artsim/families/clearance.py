@@ -23,26 +23,15 @@ _ROUNDS = 30
 
 @dataclass
 class Link:
-    """A link of a serial chain under construction.
-
-    Attributes
-    ----------
-    name : str
-    joint : JointSpec or None
-        To the link before; None for the first.
-    narrowing : float
-        Share of its limits that the joint keeps when two links come too close; nearly 1 for a joint that turns
-        about the link's own direction, as that matters little.
-    solid : Solid
-    capsules : list of (7,) float
-        Start, end and radius of rods around the solid, in the assembly's frame at rest.
-    """
+    """A link of a serial chain under construction."""
 
     name: str
-    joint: JointSpec | None = None
+    joint: JointSpec | None = None  # to the link before
+    # Share of its limits that the joint keeps when two links come too close; nearly 1 for a joint that turns about the
+    # link's own direction, as that matters little.
     narrowing: float = 0.8
     solid: Solid = field(default_factory=Solid)
-    capsules: list[Array] = field(default_factory=list)
+    capsules: list[Array] = field(default_factory=list)  # (7,): start, end, radius of rods around the solid, at rest
 
     def rod(self, start: Vector, end: Vector, radius: float, end_radius: float | None = None) -> None:
         """Add a round rod to the solid, and the capsule around it."""
@@ -58,23 +47,11 @@ class Link:
 
 
 def narrow_limits(links: list[Link], margin: float) -> bool:
-    """Narrow the limits of a chain's joints until links that no joint connects keep clear of one another.
+    """Narrow the limits of a chain's joints until links that no joint connects keep ``margin`` metres apart.
 
-    Tested in fixed random states, every other one with most joints close to a limit or at it, and in states around the
-    closest of those, again and again. Two links that are close at rest may be closer than ``margin``: half their
-    distance at rest.
-
-    Parameters
-    ----------
-    links : list of Link
-        The first is the root, each of the others hangs on the one before it. Their joints are replaced.
-    margin : float
-        Metres between the capsules.
-
-    Returns
-    -------
-    bool
-        False when that cannot be: capsules touch at rest.
+    Each link but the root hangs on the one before it; their joints are replaced. Tested in fixed random states, every
+    other one with most joints close to a limit or at it, and in states around the closest of those, again and again.
+    Two links that are close at rest may come closer: to half their distance at rest. False when capsules touch at rest.
     """
     pairs = _Pairs(links)
     if not pairs.first.size:
@@ -120,13 +97,7 @@ def _interval(joint: JointSpec | None) -> tuple[float, float]:
 
 
 class _Pairs:
-    """Pairs of capsules on links that no joint connects.
-
-    Attributes
-    ----------
-    first, second : (P,) int
-        Capsules of each pair.
-    """
+    """Pairs (P,) of capsules, ``first`` and ``second``, on links that no joint connects."""
 
     def __init__(self, links: list[Link]):
         owner = np.repeat(np.arange(len(links)), [len(link.capsules) for link in links])

@@ -17,17 +17,7 @@ from artsim.model.kinematics import Array
 
 
 def bar_handle(start: Vector, end: Vector, outward: Vector, reach: float, radius: float) -> Solid:
-    """Straight bar between two points, held by two posts that stand on the surface.
-
-    Parameters
-    ----------
-    start, end : (3,) float
-        On the surface.
-    outward : (3,) float
-        Unit normal of the surface.
-    reach : float
-        Distance of the bar from the surface.
-    """
+    """Straight bar between two points of a surface, ``reach`` before it along its unit normal, on two posts."""
     start, end, outward = (np.asarray(v, dtype=np.float64) for v in (start, end, outward))
     lifted = outward * reach
     posts = (start + share * (end - start) for share in (0.1, 0.9))
@@ -53,19 +43,15 @@ def knob(foot: Vector, outward: Vector, reach: float, radius: float) -> Solid:
 
 
 def panel(kind: str, low: Vector, high: Vector, rail: float, recess: float) -> Solid:
-    """Upright panel whose front faces -X: the face of a door or of a drawer.
+    """Upright panel between two corners whose front faces -X: the face of a door or of a drawer.
 
     Parameters
     ----------
     kind : str
         "slab"; "shaker" (frame around a sunken board); "raised" (the board rises again in its middle); "planks";
         "glass" (frame around a thin pane with glazing bars). A panel too small for its frame becomes a slab.
-    low, high : (3,) float
-        Corners of the whole panel.
-    rail : float
-        Width of the frame.
-    recess : float
-        Depth of the sunken board behind the frame.
+    rail, recess : float
+        Width of the frame; depth of the sunken board behind it.
     """
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     sides = high - low
@@ -103,12 +89,10 @@ def _rectangle(x: float, low: Array, high: Array) -> Array:
 
 
 def flat_handle(start: Vector, end: Vector, reach: float, thickness: float, depth: float) -> Solid:
-    """Flat bar along Y or Z on two posts, on a panel that faces -X.
+    """Flat bar along Y or Z on two posts, on a panel that faces -X; its start is below or to the -Y side of its end.
 
     Parameters
     ----------
-    start, end : (3,) float
-        On the panel, start below or to the -Y side of end.
     reach : float
         Distance of the bar's front from the panel.
     thickness, depth : float
@@ -143,15 +127,9 @@ def dial(foot: Vector, outward: Vector, reach: float, radius: float, sections: i
 
 
 def holed_plate(low: Vector, high: Vector, center: Vector, radius: float, axis: int = 0, sections: int = 24) -> Solid:
-    """Box with a round hole along a coordinate axis.
+    """Box with a round hole along a coordinate axis, about a center (2,) in the two other coordinates.
 
-    Parameters
-    ----------
-    low, high : (3,) float
-    center : 2 float
-        Of the hole, in the two other coordinates.
-    radius : float
-        Clear radius: of the circle inside the hole's polygon.
+    ``radius`` is that of the circle inside the hole's polygon.
     """
     low, high, middle = (np.asarray(v, dtype=np.float64) for v in (low, high, center))
     across = [i for i in range(3) if i != axis]
@@ -172,17 +150,9 @@ def holed_plate(low: Vector, high: Vector, center: Vector, radius: float, axis: 
 
 
 def windowed_panel(low: Vector, high: Vector, margins: Sequence[float], pane: float, inset: float) -> Solid:
-    """Panel that faces -X, with a window: a frame and a thinner pane set back from its front.
+    """Panel that faces -X, with a window: a frame, and a pane ``inset`` behind its front and ``pane`` thick.
 
-    Parameters
-    ----------
-    low, high : (3,) float
-    margins : 4 float
-        Width of the frame at low Y, high Y, the bottom and the top.
-    pane : float
-        Thickness of the pane.
-    inset : float
-        How far the pane lies behind the front.
+    ``margins`` are the widths of the frame at low Y, high Y, the bottom and the top.
     """
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     left, right, bottom, top = np.asarray(margins, dtype=np.float64) - 0.002
@@ -257,42 +227,26 @@ def rounded_tray(
 def push_button(face: Vector, size: Vector, round_off: float) -> Solid:
     """Button on a panel that faces -X, its front 8 mm before the panel, with 1.5 mm to travel and more to spare.
 
-    Parameters
-    ----------
-    face : (3,) float
-        Centre of the button, on the panel.
-    size : 2 float
-        Along Y and Z.
-    round_off : float
-        Radius of its corners.
+    ``face`` is its centre on the panel, ``size`` its extent along Y and Z, ``round_off`` the radius of its corners.
     """
     face = np.asarray(face, dtype=np.float64)
     half = np.array([0.0, 0.5 * size[0], 0.5 * size[1]])
     return box(face - half - (0.008, 0, 0), face + half - (0.0022, 0, 0), fillet=round_off, axis=0)
 
 
-def side_hinge(x: float, y: float, upper: float, left: bool, parent: str = "body") -> JointSpec:
-    """Upright hinge of a door in a front that faces -X.
+def side_hinge(x: float, y: float, upper: float, left: bool) -> JointSpec:
+    """Upright hinge, at (x, y), of a door in a front that faces -X.
 
-    Parameters
-    ----------
-    x, y : float
-        Where the axis stands.
-    upper : float
-        How far the door opens, radians.
-    left : bool
-        Whether the door reaches from the axis towards -Y: its hinge is on the left of someone who looks at the front.
+    It opens by up to ``upper`` radians. Where ``left``, the door reaches from the axis towards -Y: its hinge is on the
+    left of someone who looks at the front.
     """
-    return revolute(parent, (0, 0, -1 if left else 1), (x, y, 0.0), 0.0, upper)
+    return revolute("body", (0, 0, -1 if left else 1), (x, y, 0.0), 0.0, upper)
 
 
 def front_handle(kind: str, start: Vector, end: Vector, reach: float, radius: float) -> Solid:
     """Handle on a front that faces -X: "bar", "bow" or "flat"; of another kind, nothing.
 
-    Parameters
-    ----------
-    start, end : (3,) float
-        On the front, one above or beside the other, start below or to the -Y side of end.
+    It lies upright or level; its start is below or to the -Y side of its end.
     """
     if kind == "bar":
         return bar_handle(start, end, (-1, 0, 0), reach, radius)
@@ -304,17 +258,7 @@ def front_handle(kind: str, start: Vector, end: Vector, reach: float, radius: fl
 
 
 def rounded_shell(low: Vector, high: Vector, wall: float, radius: float, steps: int = 4) -> Solid:
-    """Tunnel along X with round edges, open at both ends.
-
-    Parameters
-    ----------
-    low, high : (3,) float
-        Outer corners.
-    wall : float
-        Thickness.
-    radius : float
-        Of the outer edges.
-    """
+    """Tunnel along X between two corners, open at both ends, its outer edges round."""
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     outer = rounded_rectangle(low[1:], high[1:], radius, steps)
     inner = rounded_rectangle(low[1:] + wall, high[1:] - wall, max(radius - wall, 0.1 * wall), steps)
@@ -337,14 +281,10 @@ def grid_panel(
 
     Parameters
     ----------
-    low, high : (3,) float
-        Outer corners.
     widths : 4 float
         Of the frame at low Y, high Y, low Z, high Z.
     columns, rows : sequence of float
-        Y of upright bars and Z of level ones.
-    bar : float
-        Width of these bars.
+        Y of upright bars and Z of level ones, ``bar`` wide.
     board : float
         Thickness of the board, in the middle of the frame's own.
     bore : 3 float, optional
@@ -378,12 +318,7 @@ def grid_panel(
 def swing_limits(near: float, reach: float) -> tuple[float, float]:
     """How far a hinged panel may open, radians: so as to stay in front of its own opening, and at all.
 
-    Parameters
-    ----------
-    near : float
-        Distance from the hinge to the nearest point of what stands out of the panel.
-    reach : float
-        How far that stands out beyond the hinge's plane; 0 for nothing.
+    What stands out of the panel begins ``near`` from the hinge and reaches ``reach`` beyond its plane, 0 for nothing.
     """
     slant = float(arctan2(max(reach, 0.0), near))
     return min(np.pi / 2 - slant - 0.01, np.deg2rad(88.0)), np.pi - max(slant, 0.03) - 0.05

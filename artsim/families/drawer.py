@@ -61,16 +61,9 @@ class _Furniture(Assembly):
     ) -> None:
         """A case that is open towards -X, with a grid of drawers, fixed fronts or open compartments.
 
-        Parameters
-        ----------
-        low, high : (3,) float
-            Outer corners.
-        edges_y, edges_z : (C + 1,), (R + 1,) float
-            Middles of the dividers; the first and last lie on the inner faces of the walls.
-        contents : sequence of str
-            Of each row from the bottom up: "drawer", "fixed" or "open".
-        back : bool
-            Turns it to open towards +X, reflected in the plane x = 0.
+        ``edges_y`` and ``edges_z`` are the middles of the dividers; the first and last lie on the inner faces of the
+        walls. ``contents`` says of each row from the bottom up: "drawer", "fixed" or "open". Where ``back``, it opens
+        towards +X, reflected in the plane x = 0.
         """
         low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
         thin = wall / 4

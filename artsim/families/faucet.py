@@ -232,16 +232,9 @@ def _nozzle(rng: Rng, start: Array, direction: Array, radius: float, length: flo
 
 
 def _handle(rng: Rng, pivot: Array, axis: Array, start: Array, radius: float, length: float, crowned: bool) -> Solid:
-    """A handle on a hub: a lever, a paddle, or a knob.
+    """A handle on a hub: a lever along ``start``, a paddle, or a knob.
 
-    Parameters
-    ----------
-    pivot, axis, start : (3,) float
-        Where the joint is, the hub's direction, and the direction of the lever.
-    radius, length : float
-        Of the hub; from the axis to the lever's end.
-    crowned : bool
-        Whether the hub is the top of a body, so that it is never a cross.
+    ``length`` is that from the axis to the lever's end. A hub that crowns a body is never a cross.
     """
     foot = pivot + GAP * axis
     kind = pick(rng, {"rod": 0.4, "paddle": 0.35, "ball": 0.12, "knob": 0.13})

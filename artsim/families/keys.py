@@ -22,11 +22,7 @@ CLEAR = 0.0003
 class Face:
     """A flat face with coordinates u (to the right of who looks at it) and v (up).
 
-    Attributes
-    ----------
-    origin : (3,) float
-    right, up : (3,) float
-        Unit vectors; their cross product points out of the face.
+    Its directions are unit vectors; their cross product points out of the face.
     """
 
     origin: Array
@@ -95,13 +91,7 @@ def add_key(
 def key_cells(
     u: Sequence[float], v: Sequence[float], columns: int, rows: int
 ) -> Iterator[tuple[int, int, float, float]]:
-    """Row, column and centre of each cell of a grid over a rectangle, from its upper left on.
-
-    Parameters
-    ----------
-    u, v : 2 float
-        Its limits.
-    """
+    """Row, column and centre of each cell of a grid over a rectangle of limits u and v, from its upper left on."""
     wide, high = (u[1] - u[0]) / columns, (v[1] - v[0]) / rows
     for row in range(rows):
         for column in range(columns):
@@ -145,16 +135,9 @@ def add_function_keys(
 
 
 def sleeve(low: Vector, high: Vector, hole_low: Vector, hole_high: Vector, radius: float, steps: int = 2) -> Solid:
-    """Tunnel along X with round outer edges and a rectangular hole.
+    """Tunnel along X between two corners with round outer edges and a rectangular hole, whose corners are in y and z.
 
-    Parameters
-    ----------
-    low, high : (3,) float
-        Outer corners.
-    hole_low, hole_high : 2 float
-        Corners of the hole, in y and z.
-    radius : float
-        Of the outer edges; cut to three times the thinnest wall, so that they keep clear of the hole's.
+    The edges are at most three times as round as the thinnest wall is thick, so that they keep clear of the hole's.
     """
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     walls = np.minimum(np.asarray(hole_low) - low[1:], high[1:] - np.asarray(hole_high))
@@ -174,16 +157,10 @@ def _corners(low: Vector, high: Vector) -> Array:
 
 def cross_sections(levels: ArrayLike, fronts: ArrayLike, backs: ArrayLike, halves: ArrayLike, roundness: float,
                    steps: int = 2) -> list[Array]:  # fmt: skip
-    """Rounded rectangles across the Z axis, to loft an upright body from.
+    """Rounded rectangles across the Z axis at heights ``levels``, to loft an upright body from.
 
-    Parameters
-    ----------
-    levels : (N,) float
-        Heights.
-    fronts, backs, halves : (N,) float
-        Least and largest x, and half of the width along y, at each.
-    roundness : float
-        Radius of the edges over half of the thickness, at most 1.
+    Each reaches from x = front to back and to y = half at either side; ``roundness`` is the radius of its edges over
+    half of its thickness, at most 1.
     """
     rings = []
     rows = np.stack(np.broadcast_arrays(levels, fronts, backs, halves), axis=1)

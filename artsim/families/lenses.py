@@ -15,15 +15,8 @@ DENSITY = 900.0
 class Lens:
     """A lens in the plane x = 0: what is fixed to the body, and the parts that turn or slide, in a row.
 
-    Parameters
-    ----------
-    rng : numpy Generator
-    center : (3,) float
-        Where its axis meets the body's front.
-    radius : float
-        The largest that it may have.
-    style : str
-        "tubes" (one to three that slide in a collar), "prime" (rings that turn), or "zoom" (both).
+    Its axis meets the body's front at ``center``; it is at most ``radius`` wide. Its style is "tubes" (one to three
+    that slide in a collar), "prime" (rings that turn), or "zoom" (both).
     """
 
     def __init__(self, rng: Rng, center: Vector, radius: float, style: str):

@@ -55,14 +55,9 @@ class _Dome:
     def cut(
         self, x: float, y: tuple[float, float] = (-1.0, 1.0), low: float = 0.0, share: float = 1.0, drop: float = 0.0
     ) -> Array:
-        """(N, 3) cross-section at x, clamped to a range of y.
+        """(N, 3) cross-section at x, clamped to a range of y and, in shares of the height there, of z.
 
-        Parameters
-        ----------
-        low : float
-            Lower end, in shares of the height there.
-        share, drop : float
-            Upper end, in shares of the height there, less ``drop`` metres.
+        Its upper end is ``drop`` metres lower than that.
         """
         height, half, shift = self.at(x)
         angles = np.linspace(0.0, np.pi, 9)
@@ -103,16 +98,7 @@ def build(rng: Rng) -> Assembly:
 
 
 class _Parts:
-    """Parts of a mouse that is rolled about X once it is complete.
-
-    Attributes
-    ----------
-    turn : (3, 3) float or None
-        The roll.
-    foot : Solid
-        What the rolled body stands on.
-    items : list of (str, Solid, JointSpec or None)
-    """
+    """Parts of a mouse that is rolled about X once it is complete, and the foot that its rolled body stands on."""
 
     def __init__(self, turn: Array | None) -> None:
         self.turn = turn

@@ -24,19 +24,10 @@ def with_tails(rng: Rng, usual: tuple[float, float], widest: tuple[float, float]
 
 
 def unusual_sides(rng: Rng, low: Sequence[float], high: Sequence[float], least: Sequence[float]) -> Array:
-    """Sides of a box, one of which is near the end of its range.
+    """Sides (3,) of a box, metres, one of which is near the end of its range.
 
-    Parameters
-    ----------
-    low, high : (3,) float
-        Smallest and largest share of each side in the diagonal.
-    least : (3,) float
-        Metres that each side needs at least; the box is up to a third larger than these ask for.
-
-    Returns
-    -------
-    (3,) float
-        Metres.
+    ``low`` and ``high`` are the smallest and largest share of each side in the diagonal. The box is up to a third
+    larger than the metres ask for that each side needs at least.
     """
     axis = int(rng.integers(3))
     b, c = (k for k in range(3) if k != axis)

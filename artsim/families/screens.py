@@ -12,24 +12,12 @@ from artsim.making.solids import Solid, box, frame, hull
 
 @dataclass(frozen=True)
 class Panel:
-    """A flat or bent screen about the origin, its back at x = 0.
+    """A flat or bent screen about the origin, its back at x = 0."""
 
-    Attributes
-    ----------
-    half : float
-        Half of the width.
-    rise : float
-        Half of the height.
-    thick : float
-        Of the whole panel, before x = 0.
-    bend : float
-        How far the left and right edges come forward.
-    """
-
-    half: float
-    rise: float
-    thick: float
-    bend: float
+    half: float  # of the width
+    rise: float  # half of the height
+    thick: float  # of the whole panel, before x = 0
+    bend: float  # how far the left and right edges come forward
 
 
 def draw_panel(rng: Rng, most: float = 0.95) -> Panel:

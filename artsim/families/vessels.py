@@ -23,19 +23,10 @@ Level = tuple[float, float, float, float]
 
 
 def cross_section(kind: str, sharpness: float = 0.5) -> Array:
-    """Outline of a moulded body, seen from above.
+    """Outline (24, 2) of a moulded body seen from above, from -1 to 1 along X and Y.
 
-    Parameters
-    ----------
-    kind : str
-        "round", "square" (a superellipse), "hexagon", "octagon", or "flask" (round in front, flat behind).
-    sharpness : float
-        Of a square's corners, from 0 (nearly round) to 1.
-
-    Returns
-    -------
-    (24, 2) float
-        From -1 to 1 along X and Y.
+    It is "round", "square" (a superellipse, its corners sharper from 0, nearly round, to 1), "hexagon", "octagon", or
+    "flask" (round in front, flat behind).
     """
     angles = (np.arange(SECTIONS) + 0.5) * (2.0 * np.pi / SECTIONS)
     circle = np.stack([cos(angles), sin(angles)], axis=1)
@@ -55,16 +46,9 @@ def cross_section(kind: str, sharpness: float = 0.5) -> Array:
 
 
 def moulded(levels: Sequence[Level], outline: Array, shift: float = 0.0) -> Solid:
-    """Body with a cross-section that changes with height.
+    """Body of an outline that :func:`cross_section` makes, its size changing from level to level, from the bottom up.
 
-    Parameters
-    ----------
-    levels : sequence of (height, half depth, half width, roundness)
-        From the bottom up.
-    outline : (N, 2) float
-        As :func:`cross_section` makes it.
-    shift : float
-        How far the levels stand towards +X, those that are round less: the round neck of a can stays at x = 0.
+    ``shift`` moves the levels towards +X, those that are round less: the round neck of a can stays at x = 0.
     """
     angles = (np.arange(len(outline)) + 0.5) * (2.0 * np.pi / len(outline))
     circle = np.stack([cos(angles), sin(angles)], axis=1)
@@ -75,28 +59,26 @@ def moulded(levels: Sequence[Level], outline: Array, shift: float = 0.0) -> Soli
     return loft(rings)
 
 
-def neck(radius: float, bore: float, low: float, high: float, sections: int = 18) -> Solid:
+def neck(radius: float, bore: float, low: float, high: float) -> Solid:
     """Open round neck."""
-    return ring((0, 0, 0.5 * (low + high)), UP, bore, radius, high - low, sections)
+    return ring((0, 0, 0.5 * (low + high)), UP, bore, radius, high - low, 18)
 
 
 def cap(
     radius: float, wall: float, low: float, high: float, bore: float = 0.0, top: float | None = None, sections: int = 24
 ) -> Solid:
-    """Cup upside down: it covers a neck.
+    """Cup upside down that covers a neck.
 
     Parameters
     ----------
-    radius : float
-        Outside.
+    radius, top : float
+        Outside at its edge, and at its top: the same by default.
     wall : float
         Thickness of the skirt and of the top.
     low, high : float
         Heights of its edge and of its top.
     bore : float
         Radius of a hole in the top; 0 for none.
-    top : float, optional
-        Radius at the top; that of the edge by default.
     """
     upper = radius if top is None else top
     shoulder = upper + (radius - upper) * wall / (high - low)  # outside, where the top begins
@@ -130,18 +112,9 @@ def dome(radius: float, low: float, rise: float, sections: int = 20) -> Solid:
 
 
 def pump_head(rng: Rng, low: float, stem: float, size: float, reach: float, down: float) -> Solid:
-    """Head of a pump with a nozzle towards -X, above its stem.
+    """Head of a pump with a nozzle towards -X, ``low`` above the ground, on a stem that goes ``down`` below it.
 
-    Parameters
-    ----------
-    low : float
-        Height of the head's underside.
-    stem : float
-        Radius of the stem, which goes ``down`` below the head.
-    size : float
-        Radius of the head.
-    reach : float
-        How far the nozzle reaches from the axis.
+    ``stem`` and ``size`` are the radii of stem and head; the nozzle reaches ``reach`` from the axis.
     """
     tall = size * rng.uniform(0.45, 1.3)
     solid = rod(0, 0, (low - down, low + 0.5 * tall), stem, sections=14)
@@ -170,15 +143,7 @@ def pump_head(rng: Rng, low: float, stem: float, size: float, reach: float, down
 
 
 def grip_loop(points: ArrayLike, wide: float, thick: float) -> Solid:
-    """Flat strap along points in the plane y = 0: a jug's handle.
-
-    Parameters
-    ----------
-    points : (N, 2) float
-        X and Z.
-    wide, thick : float
-        Half extents along Y and across.
-    """
+    """Flat strap along points (N, 2) in X and Z, as a jug's handle; half extents along Y and across."""
     path = np.asarray(points, dtype=np.float64)
     knots = [box(about(x, thick), wide, about(z, thick), fillet=0.8 * thick, axis=1) for x, z in path.tolist()]
     return union(hull_of(a, b) for a, b in pairwise(knots))
