@@ -129,8 +129,7 @@ def _longcase_clock(rng: Rng) -> Assembly:
             body += prism([(s * y, z) for y, z in (*horn, (0.4 * hood, 1.5 * hood))], 0.0, 0.3 * deep, 0)
     body += box((-0.02, deep), 1.1 * hood, (hood - 0.02, hood + 0.02), fillet=0.01)
     if rng.random() < 0.5:
-        for s in (-1.0, 1.0):
-            body += rod(-0.02, s * hood, (low, hood - 0.02), 0.012, sections=12)
+        body += union(rod(-0.02, s * hood, (low, hood - 0.02), 0.012, sections=12) for s in (-1.0, 1.0))
     body += box((-0.02, deep), 1.05 * hood, (low - 0.03, low + 0.002))
     body += frame((0.01, -trunk, bottom), (deep, trunk, low - 0.028), [0.02] * 4)
     body += box((deep - 0.012, deep), trunk - 0.01, (bottom + 0.01, low - 0.03))

@@ -66,8 +66,7 @@ def _pump_bottle(rng: Rng) -> Assembly:
     pump = pump_head(rng, head, stem, size, reach, head - high + 0.004)
     turning = pick(rng, {"screw": 0.3, "turn": 0.4, "fixed": 0.3})
     if turning == "fixed":
-        for y in places:
-            body += collar.moved((0, y, 0)) + rod(0, y, (low - GAP, low + wall), 0.99 * outer)
+        body += union(collar.moved((0, y, 0)) + rod(0, y, (low - GAP, low + wall), 0.99 * outer) for y in places)
     dispenser = Assembly("body", body, DENSITY)
     for number, y in enumerate(places):
         parent, tail = "body", f"_{number}" if count > 1 else ""

@@ -86,9 +86,7 @@ def _plate(outline: Array, low: float, high: float) -> Solid:
     """Plate with the handle's outline; a single piece where the outline is symmetric, and so convex."""
     if np.allclose(outline[0, :, 1], -outline[1, :, 1]):
         return prism(outline.reshape(-1, 2), low, high)
-    rings = []
-    for a, b in zip(*outline, strict=True):
-        rings.append(np.array([(*point, z) for point in (a, b) for z in (low, high)]))
+    rings = [np.array([(*point, z) for point in (a, b) for z in (low, high)]) for a, b in zip(*outline, strict=True)]
     return loft(rings)
 
 
