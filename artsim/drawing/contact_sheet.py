@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _SAMPLES_PER_ROW = 2
+_STATES = 4  # in the title of a sample
 
 
 def write_contact_sheet(
@@ -105,15 +106,15 @@ def _title(sample: Sample, what: str) -> str:
     return f"{printable(sample.category, 40)} {printable(sample.object_id, 40)}   {what}\n{state_text(sample)}"
 
 
-def state_text(sample: Sample, most: int = 4) -> str:
+def state_text(sample: Sample) -> str:
     """Joint states in words: ``lid 73 deg, drawer 12 cm``."""
     texts = []
     for k in range(1, len(sample.joint_type)):
         value = sample.joint_state[k] - sample.joint_rest[k]
         text = f"{100 * value:.1f} cm" if sample.joint_type[k] == "prismatic" else f"{np.rad2deg(value):.0f}°"
         texts.append(f"{printable(sample.part_names[k], 40)} {text}")
-    more = f", and {len(texts) - most} more" if len(texts) > most else ""
-    return ", ".join(texts[:most]) + more or "rigid"
+    more = f", and {len(texts) - _STATES} more" if len(texts) > _STATES else ""
+    return ", ".join(texts[:_STATES]) + more or "rigid"
 
 
 def contact_sheet(shown: Sequence[Shown]) -> bytes:

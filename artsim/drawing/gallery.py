@@ -9,16 +9,17 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from artsim.common.names import printable
-from artsim.model.draws import joint_intervals
+from artsim.model.draws import farther_ends
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.portrait import portrait
 
 _TILE = 260  # pixels
 _HEADER = 22
+_OBJECTS_PER_ROW = 3
 
 
-def draw_gallery(objects: Sequence[ArticulatedObject], states: int = 3, objects_per_row: int = 3) -> bytes:
+def draw_gallery(objects: Sequence[ArticulatedObject], states: int = 3) -> bytes:
     """PNG with every object at rest and opened further and further.
 
     Parameters
@@ -26,15 +27,14 @@ def draw_gallery(objects: Sequence[ArticulatedObject], states: int = 3, objects_
     objects : sequence of ArticulatedObject
     states : int
         Pictures of each object.
-    objects_per_row : int
     """
-    rows = -(-len(objects) // objects_per_row)
-    width = objects_per_row * states * _TILE
+    rows = -(-len(objects) // _OBJECTS_PER_ROW)
+    width = _OBJECTS_PER_ROW * states * _TILE
     sheet = Image.new("RGB", (width, rows * (_TILE + _HEADER)), "white")
     draw = ImageDraw.Draw(sheet)
     font = ImageFont.load_default(size=15)
     for number, obj in enumerate(objects):
-        row, column = divmod(number, objects_per_row)
+        row, column = divmod(number, _OBJECTS_PER_ROW)
         x, y = column * states * _TILE, row * (_TILE + _HEADER)
         title = printable(f"{obj.category} {obj.object_id}: {len(obj)} parts")
         draw.text((x + 6, y + 2), title, "black", font)
@@ -49,8 +49,6 @@ def opening_states(obj: ArticulatedObject, count: int) -> list[Array]:
     """At rest, then every joint on its way to its farther limit, the last time by 0.4 to 0.9 of the way."""
     rng = np.random.default_rng(0)
     rest = obj.tree.rest
-    low, high = joint_intervals(obj).T
-    far = np.where(high - rest >= rest - low, high, low)
     share = rng.uniform(0.4, 0.9, len(rest))
     steps = np.linspace(0.0, 1.0, count)
-    return [obj.tree.complete_state(rest + step * share * (far - rest)) for step in steps]
+    return [obj.tree.complete_state(rest + step * share * (farther_ends(obj) - rest)) for step in steps]

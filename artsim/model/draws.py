@@ -107,6 +107,12 @@ def joint_intervals(obj: ArticulatedObject) -> Array:
     return np.where(np.isfinite(limits), limits, turn)
 
 
+def farther_ends(obj: ArticulatedObject) -> Array:
+    """(K,) the end of each joint's interval that is farther from rest."""
+    rest, (low, high) = obj.tree.rest, joint_intervals(obj).T
+    return np.where(high - rest >= rest - low, high, low)
+
+
 def sample_state(obj: ArticulatedObject, options: StateOptions, rng: np.random.Generator) -> Array:
     """Draw joint states.
 

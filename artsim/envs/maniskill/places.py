@@ -7,7 +7,7 @@ import numpy as np
 from artsim.envs.maniskill.goal import LEAST_OPEN, MOST_OPEN, Goal
 from artsim.envs.maniskill.robots import FLOATING, ROBOTS
 from artsim.model.camera import look_at_transform
-from artsim.model.draws import bounding_sphere, joint_intervals
+from artsim.model.draws import bounding_sphere, farther_ends
 from artsim.model.kinematics import ROTATING, Array
 from artsim.model.objects import ArticulatedObject
 from artsim.physics.episode import most_open_state
@@ -26,13 +26,7 @@ _RUN_UP = 0.15  # metres between a hand that is to push and what it pushes
 def T_world_object(obj: ArticulatedObject) -> Array:
     """(4, 4) pose of an object that stands on the ground, or, where a joint goes below its foot, just above it."""
     T = np.eye(4)
-    bottoms = []
-    for q in (obj.tree.rest, most_open_state(obj)):
-        posed = obj.tree.forward_kinematics(q)
-        reach = 0.5 * (np.abs(posed[:, 2, :3]) * obj.box_size).sum(axis=1)
-        height = (posed[:, 2, :3] * obj.box_center).sum(axis=1) + posed[:, 2, 3]
-        bottoms.append((height - reach)[obj.has_surface].min())
-    T[2, 3] = -min(bottoms)
+    T[2, 3] = -min(_least(obj, q, 2) for q in (obj.tree.rest, most_open_state(obj)))
     return T
 
 
@@ -58,8 +52,7 @@ def handle(obj: ArticulatedObject, k: int) -> Array:
         facing = arm[end][np.argmin(points[end, 0])]
         there = points[end & (arm @ facing > 0.5 * far * np.linalg.norm(facing))]
     else:
-        low, high = joint_intervals(obj)[k]
-        far = points @ axis * (1.0 if high - joint.rest >= joint.rest - low else -1.0)
+        far = points @ axis * (1.0 if farther_ends(obj)[k] >= joint.rest else -1.0)
         there = points[far >= far.max() - SLICE * (far.max() - far.min())]
     middle: Array = 0.5 * (there.min(axis=0) + there.max(axis=0)) if len(there) else origin
     return middle
@@ -79,7 +72,7 @@ def robot_start(obj: ArticulatedObject, robot: str, goal: Goal) -> tuple[Array, 
     free = [int(k) for k in obj.tree.free_joints]
     handles = np.mean([handle(obj, k) for k in free], axis=0) + up
     closed = float(obj.bounds[0, 0])
-    opened = min(closed, _front(obj, most_open_state(obj)))
+    opened = min(closed, _least(obj, most_open_state(obj), 0))
     start = ROBOTS[robot]
     if robot != FLOATING:
         x = np.clip(opened - _CLEARANCE, handles[0] - _FAR, handles[0] - _NEAR)
@@ -100,9 +93,7 @@ def robot_start(obj: ArticulatedObject, robot: str, goal: Goal) -> tuple[Array, 
 def _push(obj: ArticulatedObject, k: int) -> tuple[Array, Array]:
     """(3,) where part k's handle is when all joints are open as far as they are at first, on average, and (3,) the unit
     direction in which it moves when its joint closes; rest frame."""
-    rest, intervals = obj.tree.rest, joint_intervals(obj)
-    low, high = intervals.T
-    far = np.where(high - rest >= rest - low, high, low)
+    rest, far = obj.tree.rest, farther_ends(obj)
     q = obj.tree.complete_state(rest + 0.5 * (LEAST_OPEN + MOST_OPEN) * (far - rest))
     less = q.copy()
     less[k] -= 1e-3 * (far[k] - rest[k])
@@ -127,9 +118,9 @@ def onlooker(obj: ArticulatedObject, robot: str, stand: Array) -> Array:
     return look_at_transform(middle + away / np.linalg.norm(away) * reach / np.sin(0.5 * ONLOOKER_FOV), middle)
 
 
-def _front(obj: ArticulatedObject, q: Array) -> float:
-    """Smallest x of the boxes of the posed parts, metres."""
+def _least(obj: ArticulatedObject, q: Array, axis: int) -> float:
+    """Smallest coordinate along an axis of the boxes of the posed parts, metres."""
     T = obj.tree.forward_kinematics(q)
-    reach = 0.5 * (np.abs(T[:, 0, :3]) * obj.box_size).sum(axis=1)
-    at = (T[:, 0, :3] * obj.box_center).sum(axis=1) + T[:, 0, 3]
+    reach = 0.5 * (np.abs(T[:, axis, :3]) * obj.box_size).sum(axis=1)
+    at = (T[:, axis, :3] * obj.box_center).sum(axis=1) + T[:, axis, 3]
     return float((at - reach)[obj.has_surface].min())

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from artsim.envs.maniskill.goal import APART, LEAST_OPEN, MOST_OPEN, Goal
 from artsim.envs.maniskill.places import T_world_object, handle
-from artsim.model.draws import joint_intervals
+from artsim.model.draws import farther_ends, joint_intervals
 from artsim.model.kinematics import JOINT_TYPES, ROTATING, Array
 from artsim.model.objects import ArticulatedObject
 
@@ -141,7 +141,7 @@ def truth_of(objects: Sequence[ArticulatedObject], max_joints: int, device: Any)
         free=stack(lambda obj: np.isin(np.arange(len(obj)), trees[obj].free_joints), torch.bool),
         low=stack(lambda obj: intervals[obj][:, 0]),
         high=stack(lambda obj: intervals[obj][:, 1]),
-        far=stack(lambda obj: _farther(intervals[obj], trees[obj].rest)),
+        far=stack(farther_ends),
         rotates=stack(lambda obj: [kind in ROTATING for kind in trees[obj].types], torch.bool),
         turns_freely=stack(lambda obj: [kind == "continuous" for kind in trees[obj].types], torch.bool),
         handle=stack(lambda obj: [handle(obj, k) for k in range(len(obj))]),
@@ -166,12 +166,6 @@ def _pad(array: Array, rows: int) -> Array:
     padded = np.zeros((rows, *array.shape[1:]), dtype=array.dtype)
     padded[: len(array)] = array
     return padded
-
-
-def _farther(interval: Array, rest: Array) -> Array:
-    """(K,) the end of each (K, 2) interval that is farther from rest."""
-    low, high = interval.T
-    return np.where(high - rest >= rest - low, high, low)
 
 
 def _mimic(obj: ArticulatedObject, rows: int) -> tuple[Tensor, Tensor]:

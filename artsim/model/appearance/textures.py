@@ -130,15 +130,7 @@ def screen(rng: np.random.Generator, tone: ArrayLike, size: int = SIZE) -> Image
 Maker = Callable[[np.random.Generator, ArrayLike], Image]
 
 TEXTURES: dict[str, Maker] = {
-    "wood": wood,
-    "parquet": parquet,
-    "stone": stone,
-    "plaster": plaster,
-    "fabric": fabric,
-    "tiles": tiles,
-    "card": card,
-    "brushed": brushed,
-    "screen": screen,
+    maker.__name__: maker for maker in (wood, parquet, stone, plaster, fabric, tiles, card, brushed, screen)
 }
 """Every texture by name: each drawn from a generator and a tone (3,) in sRGB, 0 to 1."""
 
