@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.common.elementary import cos, sin
+from artsim.families.details import cheeks
 from artsim.families.vessels import GAP, Level, cap, cross_section, dome, grip_loop, moulded, neck, pump_head, ribs
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute, screw
 from artsim.making.outlines import UP
@@ -43,8 +44,8 @@ def build(rng: Rng) -> Assembly:
     shape = pick(rng, SHAPES)
     wide_mouth = shape == "jar" and closure in (_screw_cap, _flip_top, _stopper, _cup, _bail)
     body, mouth = _body(rng, shape, wide_mouth, 0.022 if closure in (_pump, _sprayer, _bail) else 0.012)
-    bottle = Assembly(density=DENSITY)
-    closure(rng, bottle, body, mouth)
+    bottle = Assembly("body", body, DENSITY)
+    closure(rng, bottle, mouth)
     return bottle
 
 
@@ -148,14 +149,8 @@ def _bevelled(levels: list[Level]) -> list[Level]:
 def _jug_handle(rng: Rng, depth: float, half: float, low: float, high: float) -> Solid:
     reach = depth + rng.uniform(0.02, 0.035)
     root = 0.45 * depth
-    points = [
-        (root, high),
-        (0.85 * reach, high),
-        (reach, high - 0.15 * (high - low)),
-        (reach, low + 0.3 * (high - low)),
-        (0.8 * reach, low),
-        (root, low),
-    ]
+    upper, lower = high - 0.15 * (high - low), low + 0.3 * (high - low)
+    points = [(root, high), (0.85 * reach, high), (reach, upper), (reach, lower), (0.8 * reach, low), (root, low)]
     return grip_loop(points, min(rng.uniform(0.006, 0.012), 0.5 * half), rng.uniform(0.004, 0.006))
 
 
@@ -184,7 +179,7 @@ def _cover(rng: Rng, mouth: Mouth, bore: float = 0.0) -> tuple[Solid, float, flo
     return cap(radius, wall, low, high, bore, upper, sections), upper, low, high
 
 
-def _screw_cap(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
+def _screw_cap(rng: Rng, bottle: Assembly, mouth: Mouth) -> None:
     lid, radius, low, high = _cover(rng, mouth)
     tall = high - low
     if rng.random() < 0.5:
@@ -201,12 +196,11 @@ def _screw_cap(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
         path = [(0.0, r * cos(a), high - 0.001 + 1.1 * r * sin(a)) for a in angles.tolist()]
         lid += tube(path, 0.16 * radius, 8)
     if rng.random() < 0.3:  # a bead below the cap
-        body += ring((0, 0, mouth.foot - 0.0005), UP, 0.6 * mouth.bore, 1.12 * radius, 0.001, 20)
-    bottle.add("body", body)
+        bottle.body += ring((0, 0, mouth.foot - 0.0005), UP, 0.6 * mouth.bore, 1.12 * radius, 0.001, 20)
     bottle.add("lid", lid, _closing(rng, mouth, high - low))
 
 
-def _stopper(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
+def _stopper(rng: Rng, bottle: Assembly, mouth: Mouth) -> None:
     """A cork, a glass ball or a disc on a plug that sits in the neck."""
     plug = (mouth.bore - GAP) * cos(np.pi / 18) * 0.98
     low, rim = mouth.rim - 0.7 * (mouth.rim - mouth.foot), mouth.rim + GAP
@@ -229,11 +223,10 @@ def _stopper(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
         lid += rod(0, 0, (rim, rim + 0.25 * r), 1.15 * r)
         lid += rod(0, 0, (rim, rim + 1.1 * r), 0.35 * r) + ellipsoid((0, 0, rim + 1.4 * r), 0.6 * r, 12)
     depth = mouth.rim - low
-    bottle.add("body", body)
     bottle.add("lid", lid, prismatic("body", UP, 0.0, depth * rng.uniform(1.0, 3.0), (0, 0, rim)))
 
 
-def _flip_top(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
+def _flip_top(rng: Rng, bottle: Assembly, mouth: Mouth) -> None:
     """A lid that swings back about a hinge at the edge of a collar."""
     collar, radius, low, high = _cover(rng, mouth)
     tall = radius * rng.uniform(0.15, 0.9)
@@ -245,10 +238,8 @@ def _flip_top(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     z = base + r
     lid += rod(x, (-half, half), z, r, sections=12)
     lid += box((0.8 * radius, x), half, (base, base + 1.6 * r))
-    for s in (-1.0, 1.0):  # lugs at both ends of the barrel
-        y0, y1 = sorted((s * (half + 0.0006), s * (half + 0.0006 + 1.5 * r)))
-        collar += hull_of(rod(x, (y0, y1), z, r, sections=10),
-                          box((0.7 * radius, y0, high - 2.5 * r), (x, y1, high - r)))  # fmt: skip
+    roots = (0.7 * radius, x), (high - 2.5 * r, high - r)
+    collar += cheeks((x, z), r, half + 0.0006, half + 0.0006 + 1.5 * r, *roots, 10)
     if rng.random() < 0.6:  # a thumb rest at the front
         tip = 0.98 * radius
         lid += box((-tip - 0.2 * radius, -0.3 * radius, base + 0.05 * tall),
@@ -260,14 +251,13 @@ def _flip_top(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     limit = np.deg2rad(rng.uniform(80, 135 if tall < 0.6 * (high - low) else 95))
     turning = rng.random() < 0.35
     if turning:
-        bottle.add("body", body)
         bottle.add("collar", collar, _closing(rng, mouth, high - low))
     else:
-        bottle.add("body", body + collar)
+        bottle.body += collar
     bottle.add("lid", lid, revolute("collar" if turning else "body", (0, 1, 0), (x, 0, z), 0.0, limit))
 
 
-def _pump(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
+def _pump(rng: Rng, bottle: Assembly, mouth: Mouth) -> None:
     """A collar that turns on the neck, and a head that is pressed down in it."""
     stem = min(mouth.bore * rng.uniform(0.3, 0.5), 0.005)
     collar, radius, low, high = _cover(rng, mouth, stem + GAP)
@@ -284,12 +274,11 @@ def _pump(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     head += 0.25 * reach if reach > radius else 0.0
     down = head - high + 0.0035
     solid = pump_head(rng, head, stem, size, reach, down)
-    bottle.add("body", body)
     bottle.add("collar", collar, _closing(rng, mouth, high - low))
     bottle.add("pump", solid, prismatic("collar", -UP, 0.0, stroke, (0, 0, head)))
 
 
-def _sprayer(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
+def _sprayer(rng: Rng, bottle: Assembly, mouth: Mouth) -> None:
     """A sprayer's head on a collar, with a trigger that swings back."""
     head, radius, low, high = _cover(rng, mouth)
     wide = radius * rng.uniform(0.5, 0.8)
@@ -312,12 +301,11 @@ def _sprayer(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
     # Pulled, its tip comes no nearer than the collar.
     room = (abs(x) - 1.05 * radius - 0.003) / length
     limit = min(rng.uniform(0.25, 0.6), max(0.8 * room, 0.08))
-    bottle.add("body", body)
     bottle.add("head", head, _closing(rng, mouth, high - low))
     bottle.add("trigger", trigger, revolute("head", (0, -1, 0), (x, 0, z), 0.0, limit))
 
 
-def _cup(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
+def _cup(rng: Rng, bottle: Assembly, mouth: Mouth) -> None:
     """A vacuum flask: a screwed stopper, and a cup over it."""
     plug = (mouth.bore - GAP) * cos(np.pi / 18) * 0.98
     rim = mouth.rim + GAP
@@ -337,13 +325,12 @@ def _cup(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
                          (1.5 * radius, mouth.rim), (0.97 * radius, mouth.rim - 0.002)], 0.15 * radius,
                         0.06 * radius)  # fmt: skip
         cup += ear.turned(UP, side * rng.uniform(0.0, 0.5))
-    bottle.add("body", body)
     bottle.add("stopper", stopper, screw("body", UP, (0, 0, rim), 0.0, turns, 0.95 * depth / turns))
     lift = (top - mouth.foot) * rng.uniform(1.0, 1.8)
     bottle.add("cup", cup, prismatic("body", UP, 0.0, lift, (0, 0, top)))
 
 
-def _bail(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
+def _bail(rng: Rng, bottle: Assembly, mouth: Mouth) -> None:
     """A preserving jar or a swing-top bottle: a flat lid on a hinge at the back, with a wire bow at the front."""
     r = 0.09 * mouth.radius
     rim = mouth.rim + GAP
@@ -356,11 +343,10 @@ def _bail(rng: Rng, bottle: Assembly, body: Solid, mouth: Mouth) -> None:
         lid += dome(0.85 * radius, rim + tall - 1e-4, rng.uniform(0.1, 0.45) * radius)
     lid += rod(x, (-half, half), z, r, sections=12) + box((0.7 * radius, x), half, (rim, rim + r))
     low = 0.5 * (mouth.foot + mouth.rim)
-    body += ring((0, 0, low), UP, 0.98 * mouth.radius, mouth.radius + r, 1.6 * r, 20)
+    bottle.body += ring((0, 0, low), UP, 0.98 * mouth.radius, mouth.radius + r, 1.6 * r, 20)
     for s in (-1.0, 1.0):
         y = s * (half + 0.0006 + 0.8 * r)
-        body += tube([(0.9 * mouth.radius, y, low), (x, y, low), (x, y, z)], 0.7 * r, 8)
-    bottle.add("body", body)
+        bottle.body += tube([(0.9 * mouth.radius, y, low), (x, y, low), (x, y, z)], 0.7 * r, 8)
     limit = np.deg2rad(rng.uniform(80, 110))
     bottle.add("lid", lid, revolute("body", (0, 1, 0), (x, 0, z), 0.0, limit))
     wire = 0.5 * r

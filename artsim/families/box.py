@@ -45,10 +45,9 @@ def _rigid(rng: Rng) -> Assembly:
     grips = _side_handles(rng, x, y, height) if height > 0.12 and rng.random() < 0.25 else Solid()
     body += grips
 
-    chest = Assembly(density=700.0)
+    chest = Assembly("body", body, 700.0)
     halves = rng.random() < 0.12 and radius == 0.0
     if halves:  # two lids, hinged at the left and the right
-        chest.add("body", body)
         chest.record(handles=True)
         limit = np.deg2rad(rng.uniform(80.0, 175.0))
         thick = wall * rng.uniform(0.6, 1.2)
@@ -67,8 +66,7 @@ def _rigid(rng: Rng) -> Assembly:
     if not domed and top - seam + 0.2 * min(x, y) < 0.7 * height and rng.random() < 0.25:
         # A board below that stands out at the back, under the open lid, so that the box does not tip.
         behind = depth * rng.uniform(0.015, 0.065)
-        body += box((x - wall, axis_x + behind), 0.95 * (y - radius), (0.0, 0.6 * wall))
-    chest.add("body", body)
+        chest.body += box((x - wall, axis_x + behind), 0.95 * (y - radius), (0.0, 0.6 * wall))
     spans = [(-0.8, -0.6), (0.6, 0.8)] if rng.random() < 0.7 else [(-0.85, 0.85)]
     for first, last in spans:
         lid += rod(axis_x, (first * y, last * y), seam, barrel, sections=12)

@@ -56,19 +56,18 @@ def _platform_trolley(rng: Rng) -> Assembly:
     if kind != "bow":
         for share in (0.3, 0.6) if kind == "ladder" else (0.25, 0.35, 0.45, 0.55, 0.65):
             handle += bar((x, -wide, lift + share * rise), (x, wide, lift + share * rise), 0.7 * r)
-    cart = Assembly()
+    cart = Assembly("body", body, STEEL)
     if folds:
         handle += rod(x, (-wide, wide), foot, r, sections=12)
         for s in (-1.0, 1.0):
-            y0, y1 = sorted((s * (wide + r + 0.002), s * (wide + r + 0.006)))
-            body += box((x - 1.5 * r, x + 1.5 * r), (y0, y1), (top - 0.004, foot + 1.5 * r))
-        cart.add("body", body, density=STEEL)
+            across = (s * (wide + r + 0.002), s * (wide + r + 0.006))
+            cart.body += box((x - 1.5 * r, x + 1.5 * r), across, (top - 0.004, foot + 1.5 * r))
         limit = rng.uniform(1.2, 0.5 * np.pi)
-        cart.add("handle", handle, revolute("body", (0, -1, 0), (x, 0, foot), 0.0, limit), density=STEEL)
+        cart.add("handle", handle, revolute("body", (0, -1, 0), (x, 0, foot), 0.0, limit))
     else:
+        cart.body += handle
         if rng.random() < 0.5:
-            handle += handle.moved((-2.0 * x, 0, 0))
-        cart.add("body", body + handle, density=STEEL)
+            cart.body += handle.moved((-2.0 * x, 0, 0))
     for number, (px, py) in enumerate(spots):
         if number < swivels:
             wheels.add_caster(cart, px, py, floor)

@@ -70,7 +70,6 @@ def _mantel_clock(rng: Rng) -> Assembly:
     base = half * (rng.uniform(1.05, 1.4) if kind != "tambour" else 2.65)
     if kind != "drum" and rng.random() < 0.75:
         body += box((-0.014, deep + 0.008), base, (low - 0.15 * half, low + 0.002), fillet=0.004)
-    clock = Assembly()
     tilting = kind == "drum" and rng.random() < 0.4
     if tilting:  # the drum hangs in a fork
         drum = dial_plate(rng, radius) + rod((0.002, deep), 0, 0, half, sections=32)
@@ -81,12 +80,12 @@ def _mantel_clock(rng: Rng) -> Assembly:
         fork = tube([(x, -arm, 0), (x, -arm, -0.6 * clear), (x, -0.4 * half, -clear), (x, 0.4 * half, -clear),
                      (x, arm, -0.6 * clear), (x, arm, 0)], r, 10)  # fmt: skip
         fork += box((x - 0.8 * half, x + 0.8 * half), 0.9 * half, (-clear - 0.012, -clear + 0.002), fillet=0.005)
-        clock.add("body", fork, density=1500.0)
+        clock = Assembly("body", fork, 1500.0)
         limit = rng.uniform(0.2, 0.6)
         clock.add("case", drum, revolute("body", (0, 1, 0), (x, 0, 0), -limit, limit), density=DENSITY)
         add_hands(rng, clock, 0.95 * radius, "case")
         return clock
-    clock.add("body", body, density=DENSITY)
+    clock = Assembly("body", body, DENSITY)
     add_hands(rng, clock, 0.95 * radius, "body")
     if rng.random() < 0.45:
         _knobs(rng, clock, deep, 0.35 * radius)
@@ -155,7 +154,6 @@ def _alarm_clock(rng: Rng) -> Assembly:
     half = radius * rng.uniform(1.08, 1.25)
     body = dial_plate(rng, radius)
     body += rim(rng, 1.005 * radius, 0.06 * radius, 0.003 + 0.12 * radius)
-    clock = Assembly()
     bells = rng.random() < 0.65
     middle = 0.5 * deep
     if not bells:
@@ -174,7 +172,7 @@ def _alarm_clock(rng: Rng) -> Assembly:
             top = edge
         wide = half * rng.uniform(0.2, 0.55)
         body += box((0.3 * deep, 0.7 * deep), 0.7 * wide, (0.9 * top, top + 0.0005))
-        clock.add("body", body, density=DENSITY)
+        clock = Assembly("body", body, DENSITY)
         add_hands(rng, clock, 0.95 * radius, "body")
         button = box((0.2 * deep, 0.8 * deep), wide, (top + 0.004, top + 0.01), fillet=0.003)
         clock.add("button", button, prismatic("body", (0, 0, -1), 0.0, 0.003, (middle, 0, top)), density=DENSITY)
@@ -201,7 +199,7 @@ def _alarm_clock(rng: Rng) -> Assembly:
         angles = np.linspace(0.0, np.pi, 8)
         span = half * sin(spread) + 0.5 * size
         body += tube([(middle, span * cos(a), lean + 0.2 * size + 0.9 * size * sin(a)) for a in angles.tolist()], r, 8)
-    clock.add("body", body, density=1500.0)
+    clock = Assembly("body", body, 1500.0)
     add_hands(rng, clock, 0.95 * radius, "body")
     room = half * sin(spread) - size * cos(spread)
     if room > 0.12 * radius:

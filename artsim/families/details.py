@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from artsim.common.elementary import arctan2, cos, sin
 from artsim.common.products import unit
 from artsim.making.assembly import JointSpec, revolute
-from artsim.making.outlines import Vector, rounded_rectangle
-from artsim.making.solids import Solid, box, cylinder, frame, hull, prism, tube, union
+from artsim.making.outlines import Span, Vector, ends, rounded_rectangle
+from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, prism, rod, tube, union
 from artsim.model.kinematics import Array
 
 
@@ -232,6 +232,15 @@ def push_button(face: Vector, size: Vector, round_off: float) -> Solid:
     face = np.asarray(face, dtype=np.float64)
     half = np.array([0.0, 0.5 * size[0], 0.5 * size[1]])
     return box(face - half - (0.008, 0, 0), face + half - (0.0022, 0, 0), fillet=round_off, axis=0)
+
+
+def cheeks(
+    axle: tuple[float, float], radius: float, near: float, far: float, root_x: Span, root_z: Span, sections: int = 12
+) -> Solid:
+    """Two cheeks, from ``near`` to ``far`` on either side, that join an axle along Y at (x, z) to what lies below."""
+    x, z = axle
+    sides = [ends((s * near, s * far)) for s in (-1.0, 1.0)]
+    return union(hull_of(rod(x, y, z, radius, sections=sections), box(root_x, y, root_z)) for y in sides)
 
 
 def side_hinge(x: float, y: float, upper: float, left: bool) -> JointSpec:

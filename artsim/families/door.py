@@ -49,15 +49,13 @@ def build(rng: Rng) -> Assembly:
     height = rng.uniform(1.6, 3.0)
     depth, jamb = with_tails(rng, (0.07, 0.42), (0.07, 0.75), 0.15), rng.uniform(0.03, 0.25)
     style = Style(rng, kind)
-    door = Assembly(density=700.0)
-    door.record(handles=True)
     if kind == "sliding":
         depth = max(depth, 2 * style.thickness + 0.025)
-    body = _frame(rng, width, height, depth, jamb, style, kind)
+    door = Assembly("frame", _frame(rng, width, height, depth, jamb, style, kind), 700.0)
+    door.record(handles=True)
     if kind == "sliding":
-        _sliding(rng, door, body, width, height, depth, style)
+        _sliding(rng, door, width, height, depth, style)
         return door
-    door.add("frame", body)
     limit = float(np.deg2rad(rng.uniform(60.0, 175.0)))
     ajar = rng.uniform(0.1, 0.75) * limit if rng.random() < 0.25 else 0.0
     both = rng.random() < 0.5
@@ -75,7 +73,7 @@ def build(rng: Rng) -> Assembly:
     return door
 
 
-def _sliding(rng: Rng, door: Assembly, body: Solid, width: float, height: float, depth: float, style: Style) -> None:
+def _sliding(rng: Rng, door: Assembly, width: float, height: float, depth: float, style: Style) -> None:
     """Two leaves, one behind the other; the one behind may be fixed, as a part of the frame."""
     fixed = rng.random() < 0.4
     first = float(rng.choice([-1.0, 1.0]))  # where the leaf in front stands
@@ -95,8 +93,7 @@ def _sliding(rng: Rng, door: Assembly, body: Solid, width: float, height: float,
         leaves.append((leaf, side, 0.5 * (low + high)))
     travel = width / 2 - overlap - 0.006
     if fixed:
-        body += leaves.pop()[0] + box(depth / 2 - 0.02, (-width / 2 - 0.002, 0), 0.001)
-    door.add("frame", body)
+        door.body += leaves.pop()[0] + box(depth / 2 - 0.02, (-width / 2 - 0.002, 0), 0.001)
     for number, (leaf, side, center) in enumerate(leaves):
         name = "door" if fixed else f"door_{number}"
         door.add(name, leaf, prismatic("frame", (0, -side, 0), 0.0, travel, tuple(center)), label="door", density=500.0)

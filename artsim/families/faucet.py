@@ -82,20 +82,18 @@ def _kitchen_mixer(rng: Rng) -> Assembly:
     reach = with_tails(rng, (0.13, 0.24), (0.1, 0.5), 0.2)
     tip = max(lowest, top + 0.03) + with_tails(rng, (0.0, 0.1), (0.0, 0.4), 0.2)
     spout = _gooseneck(rng, np.array([0.0, 0.0, top]), r, reach, tip)
-    tap = Assembly()
-    tap.add("base", body, density=BRASS)
+    tap = Assembly("base", body, BRASS)
     pivot = np.array([0.0, side * stem, level])
     if rng.random() < 0.75:
         joint = swivel("base", UP, (0, 0, top), None if rng.random() < 0.5 else rng.uniform(0.9, 2.6))
-        tap.add("spout", spout, joint, density=BRASS)
+        tap.add("spout", spout, joint)
     else:
-        tap = Assembly()
-        tap.add("base", body + spout.moved((0, 0, -GAP - 0.001)), density=BRASS)
+        tap.body += spout.moved((0, 0, -GAP - 0.001))
     start = UP if rng.random() < 0.6 else FRONT
     handle = _handle(rng, pivot, out, start, hub * rng.uniform(0.9, 1.0), length, False)
     travel = rng.uniform(0.8, 1.57)
     axis = -out * side if start is UP else out * side  # towards the user, or up
-    tap.add("handle", handle, revolute("base", axis, pivot, 0.0, travel), density=BRASS)
+    tap.add("handle", handle, revolute("base", axis, pivot, 0.0, travel))
     return tap
 
 

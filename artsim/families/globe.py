@@ -34,7 +34,6 @@ def build(rng: Rng) -> Assembly:
     if rng.random() < 0.5:
         sphere += ring((0, 0, 0), axis, 0.97 * radius, 1.01 * radius, 0.02 * radius, 28)
 
-    globe = Assembly(density=900.0)
     arc = _arc(rng, arc_radius, thick, lean * tilt)
     foot = -arc_radius - 2.3 * thick
     turning = rng.random() < 0.3
@@ -42,16 +41,16 @@ def build(rng: Rng) -> Assembly:
     stand = _stand(rng, radius, foot - (GAP if turning else -1.5 * thick), thick)
     if horizon:
         stand += _horizon(rng, arc_radius + 1.6 * thick, foot, thick, radius)
+    globe = Assembly("stand", stand, 900.0)
     if turning:
         stub = rod(0, 0, (foot, foot + 2.3 * thick), 0.9 * thick, sections=16)
-        globe.add("stand", stand)
         if rng.random() < 0.5:
             joint = continuous("stand", UP, (0, 0, foot))
         else:
             joint = revolute("stand", UP, (0, 0, foot), -rng.uniform(0.8, 3.0), rng.uniform(0.8, 3.0))
         globe.add("arc", arc + stub, joint)
     else:
-        globe.add("stand", stand + arc)
+        globe.body += arc
     globe.add("globe", sphere, continuous("arc" if turning else "stand", axis, (0, 0, 0)), density=200.0)
     return globe
 

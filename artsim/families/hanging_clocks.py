@@ -72,24 +72,22 @@ def pendulum_clock(rng: Rng) -> Assembly:
         name = "square" if kind == "square" else kind
         around = half if kind != "octagon" else half / cos(np.pi / 8)
         body += prism(outline(name, around), 0.002, deep, 0)
-    clock = Assembly()
+    clock = Assembly("body", body, DENSITY)
     length = radius * rng.uniform(1.4, 3.6)
     free = rng.random() < 0.35
     if free:  # in the open below the case
         solid, swing = pendulum(rng, 0.4 * deep, low - 0.004, length, half)
-        body += box((0.35 * deep, 0.45 * deep), 0.004, (low - 0.0025, low + 0.01))
-        clock.add("body", body, density=DENSITY)
+        clock.body += box((0.35 * deep, 0.45 * deep), 0.004, (low - 0.0025, low + 0.01))
     else:
         room = half * rng.uniform(0.5, 0.85)
         bottom = low - length - 0.02
-        body += frame((0.006, -room - 0.01, bottom - 0.012), (deep, room + 0.01, low + 0.01), [0.01] * 4)
-        body += box((deep - 0.008, deep), room + 0.005, (bottom - 0.008, low + 0.005))
+        clock.body += frame((0.006, -room - 0.01, bottom - 0.012), (deep, room + 0.01, low + 0.01), [0.01] * 4)
+        clock.body += box((deep - 0.008, deep), room + 0.005, (bottom - 0.008, low + 0.005))
         if rng.random() < 0.6:
             edges = ((-room - 0.01, 0.01), (room + 0.01, 0.01), (0.5 * room, 0.5 * room), (-0.5 * room, 0.5 * room))
-            body += prism([(y, bottom - drop) for y, drop in edges], 0.006, deep, 0)
-        body += box((deep - 0.03, deep), 0.003, (low - 0.003, low + 0.01))
+            clock.body += prism([(y, bottom - drop) for y, drop in edges], 0.006, deep, 0)
+        clock.body += box((deep - 0.03, deep), 0.003, (low - 0.003, low + 0.01))
         solid, swing = pendulum(rng, 0.5 * deep, low - 0.004, length - 0.006, room)
-        clock.add("body", body, density=DENSITY)
         if rng.random() < 0.6:
             glass_door(rng, clock, 0.006, (-room - 0.008, room + 0.008), (bottom - 0.008, low - 0.002))
     x = 0.4 * deep if free else 0.5 * deep

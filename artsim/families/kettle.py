@@ -12,6 +12,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.common.products import unit
+from artsim.families.details import cheeks
 from artsim.families.vessels import Level, cross_section, dome, grip_loop, moulded
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute, screw
 from artsim.making.outlines import UP
@@ -208,13 +209,8 @@ def _hinge(pot: Pot) -> tuple[float, float, float]:
 def _lugs(pot: Pot) -> Solid:
     """What carries the barrel of the lid's hinge, at both its ends."""
     x, half, r = _hinge(pot)
-    z = pot.top + GAP + r
-    solid = Solid()
-    for s in (-1.0, 1.0):
-        y0, y1 = sorted((s * (half + 0.001), s * (half + 0.007)))
-        solid += hull_of(rod(x, (y0, y1), z, r, sections=12),
-                         box((0.85 * pot.mouth, y0, pot.top - 0.02), (x + 0.5 * r, y1, pot.top - 0.012)))  # fmt: skip
-    return solid
+    roots = (0.85 * pot.mouth, x + 0.5 * r), (pot.top - 0.02, pot.top - 0.012)
+    return cheeks((x, pot.top + GAP + r), r, half + 0.001, half + 0.007, *roots)
 
 
 def _lid_joint(rng: Rng, kind: str, pot: Pot, room: float) -> JointSpec:

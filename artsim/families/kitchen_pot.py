@@ -37,7 +37,7 @@ def build(rng: Rng) -> Assembly:
     mouth = float(np.interp(height - 0.009, profile[:, 1], profile[:, 0])) - wall  # clear radius where a lid dips in
     lid, lid_radius, top = _lid(rng, radius, height, wall, mouth, hinged)
 
-    assembly = Assembly(density=STEEL)
+    assembly = Assembly("pot", pot, STEEL)
     assembly.record(handles=True)
     if hinged:
         r = 0.005
@@ -48,11 +48,9 @@ def build(rng: Rng) -> Assembly:
         for side in (-1, 1):  # lugs on the pot, either side of the barrel
             y0, y1 = sorted((side * (half + GAP), side * (half + GAP + 0.006)))
             lug = hull_of(rod(x, (y0, y1), z, r, sections=16), box((x - r, x + r), (y0, y1), (height - 0.02, height)))
-            pot += lug + box((radius - wall, x), (y0, y1), (height - 0.02, height - 0.008))
-        assembly.add("pot", pot)
+            assembly.body += lug + box((radius - wall, x), (y0, y1), (height - 0.02, height - 0.008))
         joint = revolute("pot", (0, 1, 0), (x, 0, z), 0.0, np.deg2rad(rng.uniform(80, 105)))
     else:
-        assembly.add("pot", pot)
         share = rng.uniform(0.15, 1.0)  # cubed, as lids of real files rise by 1 % of the diagonal, those in use by half
         joint = prismatic("pot", (0, 0, 1), 0.0, 1.3 * share * share * share * radius, (0, 0, top))
     assembly.add("lid", lid, joint)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.elementary import arctan2, cos, sin
+from artsim.families.details import cheeks
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
 from artsim.making.outlines import about, lifted, superellipse
 from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, ring, rod, tube, union
@@ -31,18 +32,6 @@ def _spark_wheel(center: Array, radius: float, half: float, notched: bool) -> So
             tooth = box(1.04 * radius, 0.9 * half, 0.12 * radius)
             wheel += tooth.turned(y, np.pi * k / 6).moved(center)
     return wheel
-
-
-def _fork(center: Array, inner: float, thick: float, low: float, radius: float) -> Solid:
-    """Two cheeks beside a wheel."""
-    cheeks = Solid()
-    for side in (-1, 1):
-        y0, y1 = sorted((side * inner, side * (inner + thick)))
-        cheeks += hull_of(
-            rod(center[0], (y0, y1), center[2], radius, sections=12),
-            box((center[0] - radius, center[0] + radius), (y0, y1), (low, low + 0.001)),
-        )
-    return cheeks
 
 
 def _outline(rng: Rng, half_x: float, half_y: float) -> Array:
@@ -78,7 +67,10 @@ def _pocket(rng: Rng) -> Assembly:
     x0, x1 = wheel_center[0] + 1.25 * wheel_radius, 0.55 * half_x
     body += frame((x0, -0.85 * room_y, height - 0.001), (x1, 0.85 * room_y, chimney_high), [wall] * 4, 0, 1)
     body += rod((x0 + x1) / 2, 0, (height - 0.001, chimney_high - 0.003), 0.25 * room_y, sections=10)
-    body += _fork(wheel_center, wheel_half + GAP, 0.3 * room_y, height - 0.001, 0.7 * wheel_radius)
+    (x, _, z), size, near = wheel_center, 0.7 * wheel_radius, wheel_half + GAP
+    body += cheeks(
+        (x, z), size, near, near + 0.3 * room_y, (x - size, x + size), (height - 0.001, height - 0.001 + 0.001)
+    )
     hinge_x = half_x + 0.0012
     low = height + GAP
     knuckle = 0.0012
@@ -123,7 +115,6 @@ def _disposable(rng: Rng) -> Assembly:
     front = -0.1 * half_x
     thin = 0.0008
     side = 0.86 * half_y
-    lighter = Assembly()
     wheel_radius = rng.uniform(0.3, 0.45) * hood_tall
     wheel_half = side - thin - 3 * GAP - 0.0008
     electric = rng.random() < 0.35  # a button instead of wheel and lever
@@ -143,15 +134,13 @@ def _disposable(rng: Rng) -> Assembly:
             box((x0, x1), wide, (low, low + 0.001)),
             box((x0 + rng.uniform(0, 0.3) * half_x, x1), wide, (top - 0.003, top), fillet=0.001),
         )
-        lighter.add("body", body, density=1100.0)
-        lighter.add(
-            "button", button, prismatic("body", (0, 0, -1), 0.0, travel, (0.5 * (x0 + x1), 0, top)), density=1100.0
-        )
+        lighter = Assembly("body", body, 1100.0)
+        lighter.add("button", button, prismatic("body", (0, 0, -1), 0.0, travel, (0.5 * (x0 + x1), 0, top)))
         return lighter
     center = np.array([front - 0.15 * half_x - 0.001, 0.0, height + hood_tall - 0.35 * wheel_radius])
-    cheek = 0.0008
-    body += _fork(center, wheel_half + GAP, cheek, height - 0.001, 0.5 * wheel_radius)
-    lighter.add("body", body, density=1100.0)
+    (x, _, z), size, near = center, 0.5 * wheel_radius, wheel_half + GAP
+    body += cheeks((x, z), size, near, near + 0.0008, (x - size, x + size), (height - 0.001, height - 0.001 + 0.001))
+    lighter = Assembly("body", body, 1100.0)
     discs = rng.random() < 0.6  # toothed discs at either side of a narrower wheel
     wheel = _spark_wheel(center, wheel_radius * (0.85 if discs else 1.0), wheel_half, not discs)
     if discs:
@@ -179,7 +168,7 @@ def _disposable(rng: Rng) -> Assembly:
         length = end - reach
         turn = 0.8 * float(arctan2(low - height - GAP, length))
         joint = revolute("body", (0, -1, 0), (end, 0, low + 0.5 * thick), 0.0, max(turn, 0.03))
-    lighter.add("lever", lever, joint, density=1100.0)
+    lighter.add("lever", lever, joint)
     return lighter
 
 
@@ -257,30 +246,28 @@ def _table(rng: Rng) -> Assembly:
     flap_tall = rng.uniform(0.005, 0.012)
     split = rng.uniform(-0.25, 0.15) * half_x
     travel = rng.uniform(0.003, 0.006)
-    lighter = Assembly()
+    lighter = Assembly("body", body, 2500.0)
     wide, hinge_x = 0.75 * half_y, 0.78 * half_x
     flame = 0.5 * (split + hinge_x)
     burner = min(0.22 * half_y, 0.5 * (hinge_x - split) - 0.0035)  # before the flap's tongue
-    body += rod(flame, 0, (height - 0.001, height + 0.5 * flap_tall), burner, sections=12)
+    lighter.body += rod(flame, 0, (height - 0.001, height + 0.5 * flap_tall), burner, sections=12)
     low = height + travel + GAP
     top = low + rng.uniform(0.004, 0.014)
     button = box((-0.8 * half_x, split - 2 * GAP - 0.001), 0.7 * wide, (low, top), fillet=rng.uniform(0.001, 0.004))
     thin = 0.0012
     if rng.random() < 0.7:
         at = height + 0.0016
-        body += union(
+        lighter.body += union(
             box(about(hinge_x, 0.0012), about(s * 0.5 * wide, 0.0015), (height - 0.001, at - 0.0004)) for s in (-1, 1)
         )
         base = at + GAP
         flap = frame((split, -wide, base), (hinge_x - 0.0015, wide, base + flap_tall), [thin] * 4, 0, 1)
         flap += box((split, hinge_x - 0.0015), wide, (base + flap_tall - thin, base + flap_tall))
         flap += box((hinge_x - 0.003, hinge_x + 0.001), 0.3 * wide, (base, base + 0.5 * flap_tall))
-        lighter.add("body", body, density=2500.0)
         turn = revolute("body", (0, 1, 0), (hinge_x + 0.001, 0, at + GAP), 0.0, rng.uniform(1.2, 1.9))
-        lighter.add("lid", flap, turn, density=2500.0)
+        lighter.add("lid", flap, turn)
     else:
-        body += frame((split, -wide, height - 0.001), (hinge_x, wide, height + flap_tall), [thin] * 4, 0, 1)
-        lighter.add("body", body, density=2500.0)
+        lighter.body += frame((split, -wide, height - 0.001), (hinge_x, wide, height + flap_tall), [thin] * 4, 0, 1)
     lighter.add("button", button, prismatic("body", (0, 0, -1), 0.0, travel, (-0.4 * half_x, 0, top)), density=1500.0)
     if rng.random() < 0.35:  # a wheel below for the gas
         radius = 0.4 * half_y

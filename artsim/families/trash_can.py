@@ -37,14 +37,8 @@ def build(rng: Rng) -> Assembly:
     if kind == "wheelie":
         return _wheelie(rng)
     size = Bin(rng)
-    can = Assembly()
-    body = _body(rng, size)
-    if kind == "swing":
-        _swinging_flap(rng, can, body, size)
-    elif kind == "halves":
-        _two_lids(rng, can, body, size)
-    else:
-        _pedal_bin(rng, can, body, size)
+    can = Assembly("body", _body(rng, size), 500.0)
+    {"pedal": _pedal_bin, "swing": _swinging_flap, "halves": _two_lids}[kind](rng, can, size)
     return can
 
 
@@ -61,7 +55,7 @@ def _body(rng: Rng, size: Bin) -> Solid:
     return body
 
 
-def _pedal_bin(rng: Rng, can: Assembly, body: Solid, size: Bin) -> None:
+def _pedal_bin(rng: Rng, can: Assembly, size: Bin) -> None:
     """A lid hinged at the back, mostly with a pedal."""
     x, seam = size.x, size.height + GAP
     hinge = (x + 0.013, 0.0, seam)
@@ -74,7 +68,7 @@ def _pedal_bin(rng: Rng, can: Assembly, body: Solid, size: Bin) -> None:
     lid += box((x - 0.012, hinge[0]), half, (seam, seam + 0.007))
     lid += rod(hinge[0], (-half, half), seam + 0.002, 0.006, sections=12)
     if rng.random() < 0.6:  # housing of the hinge
-        body += box((x - 0.006 - size.taper, x + 0.014), 0.8 * half, (size.height - 0.14, size.height - 0.02))
+        can.body += box((x - 0.006 - size.taper, x + 0.014), 0.8 * half, (size.height - 0.14, size.height - 0.02))
     falls = rng.random() < 0.35  # over the back, past the upright, as far as the hinge lets it
     turned_over = 180.0 if rng.random() < 0.5 else rng.uniform(110.0, 205.0)  # many real lids turn by half a turn
     limit = np.deg2rad(turned_over if falls else rng.uniform(60.0, 110.0))
@@ -83,15 +77,13 @@ def _pedal_bin(rng: Rng, can: Assembly, body: Solid, size: Bin) -> None:
         if rng.random() < 0.6:
             lip = (-x - rng.uniform(0.015, 0.03), -0.4 * half, seam + 0.002)
             lid += box(lip, (-x + 0.002, 0.4 * half, seam + 0.008), fillet=0.003)
-        can.add("body", body, density=500.0)
-        can.add("lid", lid, joint, density=500.0)
+        can.add("lid", lid, joint)
         return
     wide = rng.uniform(0.025, 0.05)
     base = -x + size.taper - 0.005
     cheeks = [s * (wide + 0.007) for s in (-1, 1)]
-    body += union(box((base - 0.025, base + 0.03), (c - 0.004, c + 0.004), (0, size.foot + 0.012)) for c in cheeks)
-    can.add("body", body, density=500.0)
-    can.add("lid", lid, joint, density=500.0)
+    can.body += union(box((base - 0.025, base + 0.03), (c - 0.004, c + 0.004), (0, size.foot + 0.012)) for c in cheeks)
+    can.add("lid", lid, joint)
     tip, middle = base - rng.uniform(0.03, 0.06), 0.5 * size.foot + 0.01
     pedal = hull_of(
         box((tip, tip + 0.02), wide, (middle - 0.004, middle + 0.004), fillet=0.004, axis=1),
@@ -102,27 +94,25 @@ def _pedal_bin(rng: Rng, can: Assembly, body: Solid, size: Bin) -> None:
     can.add("pedal", pedal, turn, density=800.0)
 
 
-def _swinging_flap(rng: Rng, can: Assembly, body: Solid, size: Bin) -> None:
+def _swinging_flap(rng: Rng, can: Assembly, size: Bin) -> None:
     """A hood that narrows to an opening, in which a flap turns about its middle."""
     rise = rng.uniform(0.3, 1.0) * size.x
     shrink = rng.uniform(0.1, 0.3) * size.x
     x, y, top = size.x, size.y, size.height + rise
     profile = [(0.0, 0.0), (1.0, shrink)]
-    body += rounded_tray((-x, -y, size.height - 0.001), (x, y, top), 0.004, size.radius, profile, floor=0.0,
+    can.body += rounded_tray((-x, -y, size.height - 0.001), (x, y, top), 0.004, size.radius, profile, floor=0.0,
                          steps=size.steps)  # fmt: skip
-    can.add("body", body, density=500.0)
     rim = shrink + 0.004 + 0.003
     flap = box((-x + rim, -y + rim, top - 0.012), (x - rim, y - rim, top - 0.006),
                        fillet=max(size.radius - rim, 0.002), axis=2, steps=size.steps)  # fmt: skip
     flap += box(0.006, 0.8 * (y - rim), (top - 0.016, top - 0.011))
     limit = np.deg2rad(rng.uniform(40.0, 80.0))
-    can.add("flap", flap, revolute("body", (0, 1, 0), (0, 0, top - 0.009), -limit, limit), label="lid", density=500.0)
+    can.add("flap", flap, revolute("body", (0, 1, 0), (0, 0, top - 0.009), -limit, limit), label="lid")
 
 
-def _two_lids(rng: Rng, can: Assembly, body: Solid, size: Bin) -> None:
+def _two_lids(rng: Rng, can: Assembly, size: Bin) -> None:
     """Two leaves that turn at the left and the right and meet in the middle."""
     seam, thick = size.height + GAP, rng.uniform(0.006, 0.012)
-    can.add("body", body, density=500.0)
     limit = np.deg2rad(rng.uniform(70.0, 95.0))
     whole = box(size.x, size.y, (seam, seam + thick), fillet=size.radius, axis=2, steps=6)
     for number, s in enumerate((1.0, -1.0)):
@@ -132,7 +122,7 @@ def _two_lids(rng: Rng, can: Assembly, body: Solid, size: Bin) -> None:
         lid += rod((-barrel, barrel), hinge, seam + 0.001, 0.0045, sections=12)
         inner = s * 0.9 * size.y
         lid += box(barrel, (min(hinge, inner), max(hinge, inner)), (seam + 0.0005, seam + 0.005))
-        can.add(f"lid_{number}", lid, revolute("body", (-s, 0, 0), (0, hinge, seam), 0.0, limit), density=500.0)
+        can.add(f"lid_{number}", lid, revolute("body", (-s, 0, 0), (0, hinge, seam), 0.0, limit))
 
 
 def _wheelie(rng: Rng) -> Assembly:
