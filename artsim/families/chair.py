@@ -34,7 +34,7 @@ def build(rng: Rng) -> Assembly:
     travel = 0.6 * (sleeve - hub)
     seat_low = sleeve + rng.uniform(0.05, 0.1)
 
-    base = _star(rng, legs, span, floor, hub, column, piston, sleeve, castors)
+    base = _star(rng, legs, span, floor, hub, column, sleeve)
     if not lifted:
         base += rod(0, 0, (hub - 0.01, seat_low - 0.002), column, sections=18)
     chair = Assembly("base", base, 1500.0)
@@ -109,20 +109,11 @@ def _controls(rng: Rng, chair: Assembly, width: float, low: float) -> None:
         chair.add("knob", knob, continuous("seat", SIDE, foot), density=1200.0)
 
 
-def _star(
-    rng: Rng,
-    legs: int,
-    span: float,
-    floor: float,
-    hub: float,
-    column: float,
-    piston: float,
-    sleeve: float,
-    castors: bool,
-) -> Solid:
-    """Legs around a column with a bore for the piston, or a disc."""
-    low = floor + (0.004 if castors else 0.012)
-    solid = ring((0, 0, 0.5 * (hub - 0.03 + sleeve)), UP, piston + GAP, column + 0.002, sleeve - hub + 0.03, 14)
+def _star(rng: Rng, legs: int, span: float, floor: float, hub: float, column: float, sleeve: float) -> Solid:
+    """Legs around a column with a bore for the piston, or a disc; castors below lift it to a floor above 0."""
+    low = floor + (0.004 if floor > 0 else 0.012)
+    bore, tall = column - 0.004 - GAP + GAP, sleeve - hub + 0.03
+    solid = ring((0, 0, 0.5 * (hub - 0.03 + sleeve)), UP, bore, column + 0.002, tall, 14)
     solid += rod(0, 0, (low, hub), 1.7 * column, 1.35 * column, 20)
     if not legs:
         thick = rng.uniform(0.012, 0.03)
@@ -135,7 +126,7 @@ def _star(
         root = box(0.01, wide, (low + slope * (hub - low - 0.04), hub - 0.006), fillet=0.006)
         tip = box((span - 0.02, span + 0.02), narrow, (low, tip_top), fillet=0.006)
         leg = hull_of(root, tip)
-        if not castors:
+        if floor == 0:
             leg += rod(span, 0, (0, low + 0.01), 0.9 * narrow, sections=14)
         solid += leg.turned(UP, 2.0 * np.pi * (k + 0.5) / legs)
     return solid

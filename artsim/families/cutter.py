@@ -16,42 +16,44 @@ from artsim.making.solids import Solid, box, cylinder, prism, rod, union
 GAP = 0.0005
 
 
+class _Case:
+    """Measures of a cutter, metres: its handle from x = ``front`` to ``end``, the channel and slot of its blade."""
+
+    def __init__(self, rng: Rng) -> None:
+        self.length = length = rng.uniform(0.07, 0.3)
+        self.half = 0.5 * length * rng.uniform(0.075, 0.45)
+        self.height = max(min(2 * self.half * rng.uniform(0.2, 1.0), 0.26 * length), 0.009)
+        if rng.random() < 0.15:  # a slim cutter of sheet steel
+            self.height = max(length * rng.uniform(0.02, 0.05), 0.006)
+        self.wall = min(rng.uniform(0.0016, 0.003), 0.22 * self.height)
+        self.blade_half = (self.half - self.wall - GAP) * rng.uniform(0.8, 1.0)
+        self.slot = self.blade_half * rng.uniform(0.3, 0.5)
+        self.nose = length * rng.uniform(0.02, 0.16)
+        self.capped = rng.random() < 0.45
+        self.front = -0.5 * length
+        self.end = 0.5 * length - (rng.uniform(0.008, 0.018) if self.capped else 0.0)
+        self.channel, self.sheet = 0.5 * self.height - 0.0006, 0.0014  # bottom and thickness of the blade
+        self.roof, self.inner = self.channel + self.sheet + GAP, self.blade_half + GAP
+
+
 def build(rng: Rng) -> Assembly:
     """A cutter lying flat, its blade drawn in at rest."""
-    length = rng.uniform(0.07, 0.3)
-    half = 0.5 * length * rng.uniform(0.075, 0.45)
-    height = max(min(2 * half * rng.uniform(0.2, 1.0), 0.26 * length), 0.009)
-    if rng.random() < 0.15:  # a slim cutter of sheet steel
-        height = max(length * rng.uniform(0.02, 0.05), 0.006)
-    wall = min(rng.uniform(0.0016, 0.003), 0.22 * height)
-    blade_half = (half - wall - GAP) * rng.uniform(0.8, 1.0)
-    slot = blade_half * rng.uniform(0.3, 0.5)
-    nose = length * rng.uniform(0.02, 0.16)
-    capped = rng.random() < 0.45
-    front, back = -0.5 * length, 0.5 * length
-    cap = rng.uniform(0.008, 0.018) if capped else 0.0
-    end = back - cap
-
-    channel = 0.5 * height - 0.0006  # bottom of the blade
-    sheet = 0.0014
-    roof = channel + sheet + GAP
-    inner = blade_half + GAP
-    body = _body(rng, front, end, half, height, inner, slot + GAP, channel - GAP, roof, nose, wall, capped)
-    cutter = Assembly("body", body, 1100.0)
-
-    blade_end = end - max(wall + 0.002, 0.005) - length * rng.uniform(0.0, 0.1)
-    blade = _blade(rng, front + rng.uniform(0.0005, 0.003), blade_end, blade_half, channel, sheet)
-    button = min(length * rng.uniform(0.05, 0.2), 0.03)
-    button_end = blade_end - rng.choice([0.0, rng.uniform(0.0, 0.2)]) * length
+    c = _Case(rng)
+    front, end, half, height = c.front, c.end, c.half, c.height
+    cutter = Assembly("body", _body(rng, c), 1100.0)
+    blade_end = end - max(c.wall + 0.002, 0.005) - c.length * rng.uniform(0.0, 0.1)
+    blade = _blade(rng, front + rng.uniform(0.0005, 0.003), blade_end, c.blade_half, c.channel, c.sheet)
+    button = min(c.length * rng.uniform(0.05, 0.2), 0.03)
+    button_end = blade_end - rng.choice([0.0, rng.uniform(0.0, 0.2)]) * c.length
     top = height + (rng.uniform(0.002, 0.006) if height > 0.009 else rng.uniform(0.0012, 0.003))
-    blade += _button(rng, button_end - button, button_end, slot, roof - GAP, height, top, half)
+    blade += _button(rng, button_end - button, button_end, c.slot, c.roof - GAP, height, top, half)
     # The button stops before the bridge over the slot at the nose.
-    travel = (button_end - button) - (front + nose) - 0.004
+    travel = (button_end - button) - (front + c.nose) - 0.004
     travel *= rng.uniform(0.8, 1.0)
-    cutter.add("blade", blade, prismatic("body", (-1, 0, 0), 0.0, travel, (front, 0, channel)), density=5000.0)
-    if capped:
-        plug = box((end + GAP, back), half * 0.97, (0.03 * height, 0.97 * height), fillet=0.002)
-        plug += box((end - wall, end + 0.003), 0.8 * inner, (channel, channel + sheet))
+    cutter.add("blade", blade, prismatic("body", (-1, 0, 0), 0.0, travel, (front, 0, c.channel)), density=5000.0)
+    if c.capped:
+        plug = box((end + GAP, 0.5 * c.length), half * 0.97, (0.03 * height, 0.97 * height), fillet=0.002)
+        plug += box((end - c.wall, end + 0.003), 0.8 * c.inner, (c.channel, c.channel + c.sheet))
         pull = rng.uniform(0.015, 0.03)
         cutter.add("cap", plug, prismatic("body", (1, 0, 0), 0.0, pull, (end, 0, 0.5 * height)), density=1000.0)
     if rng.random() < 0.25:
@@ -65,49 +67,37 @@ def build(rng: Rng) -> Assembly:
     return cutter
 
 
-def _body(
-    rng: Rng,
-    front: float,
-    back: float,
-    half: float,
-    height: float,
-    inner: float,
-    slot: float,
-    floor: float,
-    roof: float,
-    nose: float,
-    wall: float,
-    capped: bool,
-) -> Solid:
+def _body(rng: Rng, c: _Case) -> Solid:
     """Floor, two sides and two lips that leave a slot along the top, closed over it at the back."""
-    mouth = nose * rng.uniform(0.0, 0.4)  # one side of the channel begins further back
-    narrow = inner + 0.3 * (half - inner)
-    outer = np.array([(front, narrow), (front + nose, half), (back, half)])
+    front, back, half, height = c.front, c.end, c.half, c.height
+    mouth = c.nose * rng.uniform(0.0, 0.4)  # one side of the channel begins further back
+    narrow = c.inner + 0.3 * (half - c.inner)
+    outer = np.array([(front, narrow), (front + c.nose, half), (back, half)])
     bulge = half * rng.uniform(0.0, 0.6) * (rng.random() < 0.5)
-    solid = prism(np.concatenate([outer, outer * (1, -1)]), 0.12 * height, floor)
+    solid = prism(np.concatenate([outer, outer * (1, -1)]), 0.12 * height, c.channel - GAP)
     solid += prism(np.concatenate([outer, outer * (1, -1)]) * (0.99, 0.86), 0.0, 0.2 * height)
     for side in (-1, 1):
-        inside = np.array([(back, inner), (front + mouth * (side < 0), inner)])
+        inside = np.array([(back, c.inner), (front + mouth * (side < 0), c.inner)])
         wall_outline = np.concatenate([outer, inside]) * (1, side)
         solid += prism(wall_outline, 0.12 * height, 0.88 * height)
-        lip = np.array([(front + nose, slot), (back, slot)])
+        lip = np.array([(front + c.nose, c.slot + GAP), (back, c.slot + GAP)])
         lip_outline = np.concatenate([outer, lip]) * (1, side)
-        solid += prism(lip_outline, roof, 0.9 * height)
+        solid += prism(lip_outline, c.roof, 0.9 * height)
         crown = np.concatenate([outer * (0.99, 0.86), lip * (0.99, 1.0)]) * (1, side)
         solid += prism(crown, 0.85 * height, height)
     tail = 0.004
-    if capped:
-        solid += box((back - tail, back), half, (roof, 0.9 * height))
+    if c.capped:
+        solid += box((back - tail, back), half, (c.roof, 0.9 * height))
     else:
         outline = rounded_rectangle((back - 2 * tail, -half), (back + 0.3 * half, half), 0.6 * half)
         solid += prism(outline[outline[:, 0] > back - tail - 1e-6], 0.05 * height, 0.95 * height)
     for x in np.linspace(0.15, 0.15 + 0.04 * rng.integers(0, 7), int(rng.integers(0, 6))):
-        at = front + nose + x * (back - front)
+        at = front + c.nose + x * (back - front)
         for side in (-1, 1):
             rib = (at, side * half)  # no deeper than the wall
-            solid += cylinder((*rib, 0.2 * height), (*rib, 0.8 * height), min(0.0014, 0.8 * wall), sections=8)
+            solid += cylinder((*rib, 0.2 * height), (*rib, 0.8 * height), min(0.0014, 0.8 * c.wall), sections=8)
     if bulge > 0:
-        start, stop = front + nose + 0.3 * (back - front), back - 0.005
+        start, stop = front + c.nose + 0.3 * (back - front), back - 0.005
         for side in (-1, 1):
             grip = np.array([(start, half - 0.001), (start + 0.02, half + bulge), (stop - 0.02, half + bulge),
                              (stop, half - 0.001)])  # fmt: skip

@@ -277,15 +277,9 @@ def rounded_shell(low: Vector, high: Vector, wall: float, radius: float, steps: 
 
 
 def grid_panel(
-    low: Vector,
-    high: Vector,
-    widths: Sequence[float],
-    columns: Sequence[float],
-    rows: Sequence[float],
-    bar: float,
-    board: float,
+    low: Vector, high: Vector, widths: Vector, columns: Vector, rows: Vector, bar: float, board: float,
     bore: tuple[float, float, float] | None = None,
-) -> Solid:
+) -> Solid:  # fmt: skip
     """Frame across the X axis with crossbars and a thinner board or pane between them: a door's leaf, a window's sash.
 
     Parameters

@@ -67,7 +67,7 @@ def build(rng: Rng) -> Assembly:
         high = np.array([-depth / 2 + style.thickness, max(edge, inner), height - 0.005])
         name = "door" if kind == "single" else f"door_{number}"
         turning = style.handle in ("lever", "knob") and (number == 0 or both)
-        _leaf(rng, door, name, side, (low, high), style, limit, turning)
+        _leaf(rng, door, name, side, low, high, style, limit, turning)
         if ajar > 0 and number == 0:
             door.open_at_rest(name, ajar)
     return door
@@ -183,17 +183,9 @@ def _raised(low: Array, high: Array, cell: Array, style: Style) -> Solid:
 
 
 def _leaf(
-    rng: Rng,
-    door: Assembly,
-    name: str,
-    side: float,
-    box_of_leaf: tuple[Array, Array],
-    style: Style,
-    limit: float,
-    turning: bool,
+    rng: Rng, door: Assembly, name: str, side: float, low: Array, high: Array, style: Style, limit: float, turning: bool
 ) -> None:
     """A leaf hinged at ``side`` (1: left, as one stands before it), with its handle at the other edge."""
-    low, high = box_of_leaf
     edge = high[1] if side > 0 else low[1]
     width = high[1] - low[1]
     stile = min(style.stile, 0.22 * width)

@@ -50,30 +50,23 @@ class _Furniture(Assembly):
         self.record(handles=style.handle != "none", legs=False)
 
     def add_case(
-        self,
-        low: Vector,
-        high: Vector,
-        wall: float,
-        edges_y: Array,
-        edges_z: Array,
-        contents: Sequence[str] = (),
-        back: bool = False,
+        self, low: Vector, high: Vector, wall: float, grid: list[Array], rows: Sequence[str] = (), back: bool = False
     ) -> None:
         """A case that is open towards -X, with a grid of drawers, fixed fronts or open compartments.
 
-        ``edges_y`` and ``edges_z`` are the middles of the dividers; the first and last lie on the inner faces of the
-        walls. ``contents`` says of each row from the bottom up: "drawer", "fixed" or "open". Where ``back``, it opens
+        ``grid`` holds, in Y and in Z, the middles of the dividers; the first and last lie on the inner faces of the
+        walls. ``rows`` says of each from the bottom up: "drawer", "fixed" or "open". Where ``back``, it opens
         towards +X, reflected in the plane x = 0.
         """
         low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
-        thin = wall / 4
+        thin, (edges_y, edges_z) = wall / 4, grid
         solid = tray(low, high, wall, wall / 2, axis=0, side=-1)
         for z in edges_z[1:-1]:
             solid += box((low[0], high[0] - wall / 4), (low[1] + wall / 2, high[1] - wall / 2), (z - thin, z + thin))
         for y in edges_y[1:-1]:
             solid += box((low[0], high[0] - wall / 4), (y - thin, y + thin), (low[2] + wall / 2, high[2] - wall / 2))
         for row in range(len(edges_z) - 2, -1, -1):
-            content = contents[row] if contents else "drawer"
+            content = rows[row] if rows else "drawer"
             for column in range(len(edges_y) - 1):
                 cell_low = np.array([low[0], edges_y[column] + thin, edges_z[row] + thin])
                 cell_high = np.array([high[0] - wall / 2, edges_y[column + 1] - thin, edges_z[row + 1] - thin])
@@ -138,7 +131,7 @@ def _chest(rng: Rng, furniture: _Furniture) -> None:
         contents[:others] = [pick(rng, {"open": 0.7, "fixed": 0.3})] * others
     furniture.add_case(
         (x0, -y, legs), (x1, y, top), wall,
-        _widths(rng, -y + wall, y - wall, columns), _shares(rng, legs + wall, top - wall, rows), contents,
+        [_widths(rng, -y + wall, y - wall, columns), _shares(rng, legs + wall, top - wall, rows)], contents,
     )  # fmt: skip
     if rng.random() < 0.55:  # a top that stands over
         over = rng.uniform(0.003, 0.04)
@@ -186,7 +179,7 @@ def _table(rng: Rng, furniture: _Furniture) -> None:
         if sides in ("both", ("front", "back")[back]):
             furniture.add_case(
                 (x0 + inset, middle - span, top - apron), (x0 + inset + reach, middle + span, top + 0.001), wall,
-                edges, np.array([top - apron + wall, top - wall]), back=back,
+                [edges, np.array([top - apron + wall, top - wall])], back=back,
             )  # fmt: skip
             for near, far in ((-between, middle - span + 0.002), (middle + span - 0.002, between)):
                 if far - near > 0.003:
@@ -234,7 +227,7 @@ def _desk(rng: Rng, furniture: _Furniture) -> None:
     for side in sides:
         near, far = sorted((side * outer, side * (outer - pedestal)))
         furniture.add_case(
-            (x0, near, low), (x1, far, top + 0.001), wall, np.array([near + wall, far - wall]), levels, contents
+            (x0, near, low), (x1, far, top + 0.001), wall, [np.array([near + wall, far - wall]), levels], contents
         )
         if not on_legs and low > 0:
             furniture.body += frame((x0 + 0.03, near + 0.01, 0), (x1 - 0.01, far - 0.01, low + 0.001), [wall] * 4, 0, 1)
@@ -255,8 +248,8 @@ def _desk(rng: Rng, furniture: _Furniture) -> None:
         columns = pick(rng, {1: 0.7, 2: 0.3})
         edges = np.linspace(left + wall, right - wall, columns + 1)
         furniture.add_case(
-            (x0, left, top - flat), (x1 - max(0.058, rng.uniform(0.05, 0.3) * depth), right, top + 0.001), wall, edges,
-            np.array([top - flat + wall, top - wall]),
+            (x0, left, top - flat), (x1 - max(0.058, rng.uniform(0.05, 0.3) * depth), right, top + 0.001), wall,
+            [edges, np.array([top - flat + wall, top - wall])],
         )  # fmt: skip
 
 

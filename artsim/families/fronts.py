@@ -19,6 +19,9 @@ from artsim.model.kinematics import Array
 GAP = 0.0015
 Moving = tuple[str, Solid, JointSpec]
 """Label, solid and joint of a moving part; its parent is "body"."""
+HINGES = {"left": (1, 1, (0, 0, -1)), "right": (1, -1, (0, 0, 1)), "top": (2, 1, (0, 1, 0)),
+          "bottom": (2, -1, (0, -1, 0))}  # fmt: skip
+"""Of each hinge: the axis of the front across which it lies, its end there, and its direction."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +157,7 @@ def shelves(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     return _shelves(rng, cell, style.face + rng.uniform(0.0, 0.02), style), []
 
 
-def fixed(cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+def fixed(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     """A front that does not move, as before a sink."""
     low, high = _front_box(cell, style)
     margin = np.array([0.0, 0.002, 0.002])
@@ -231,22 +234,11 @@ def _face(low: Array, high: Array, style: Style) -> Solid:
     return panel(style.panel, low, high, style.rail, style.recess)
 
 
-# Of each hinge side: the axis of the front across which it lies (1: Y, 2: Z), whether it lies at that axis's high end,
-# and the direction of the hinge.
-_HINGES = {
-    "left": (1, True, (0.0, 0.0, -1.0)),
-    "right": (1, False, (0.0, 0.0, 1.0)),
-    "top": (2, True, (0.0, 1.0, 0.0)),
-    "bottom": (2, False, (0.0, -1.0, 0.0)),
-}
-
-
 def _leaf(rng: Rng, cell: Cell, style: Style, hinge: str, low: Array, high: Array) -> Moving:
     """A hinged panel with its handle near the edge that opens."""
-    across, at_high, axis = _HINGES[hinge]
+    across, end, axis = HINGES[hinge]
     along = 3 - across
-    edge = high[across] if at_high else low[across]
-    inward = -1.0 if at_high else 1.0
+    edge = high[across] if end > 0 else low[across]
     width, length = high[across] - low[across], high[along] - low[along]
     solid = _face(low, high, style)
 
@@ -254,14 +246,14 @@ def _leaf(rng: Rng, cell: Cell, style: Style, hinge: str, low: Array, high: Arra
     half = 0.5 * min(style.handle_length, 0.6 * (width if run == across else length))
     grip = np.array([low[0], 0.0, 0.0])
     aside = max(style.rail / 2, 0.02) + (half if run == across else 0.0)
-    grip[across] = edge + inward * (width - aside)
+    grip[across] = edge - end * (width - aside)
     margin = 0.03 + (half if run == along else 0.0)
     place = style.place if across == 1 else 0.5
     grip[along] = np.clip(low[along] + place * length, low[along] + margin, high[along] - margin)
     handle = _handle(style, grip, run, half, low, high)
-    outer = (cell.outer_high if at_high else cell.outer_low)[across - 1] and across == 1
+    outer = (cell.outer_high if end > 0 else cell.outer_low)[across - 1] and across == 1
     bounds = handle.bounds() if handle.pieces else np.array([grip, grip])
-    near = edge - bounds[1, across] if at_high else bounds[0, across] - edge
+    near = edge - bounds[1, across] if end > 0 else bounds[0, across] - edge
     limit, most = swing_limits(near, low[0] - bounds[0, 0])
     if outer:
         limit = min(most, np.deg2rad(rng.choice([95.0, 110.0, 135.0, 170.0])))

@@ -6,6 +6,7 @@ doors, shelves, crispers; dispenser, feet, round edges, overhanging top.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +18,8 @@ from artsim.making.solids import Solid, box, frame, posts, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.003
+Front = tuple[int, float, float, float, float]
+"""Side of the hinge (1: at +Y, -1: at -Y, 0: a drawer), then y and z from low to high."""
 
 
 class Style:
@@ -43,9 +46,8 @@ def build(rng: Rng) -> Assembly:
     half, depth = 0.5 * width, rng.uniform(0.45, 0.6) if small else rng.uniform(0.5, 0.72)
     foot = rng.uniform(0.015, 0.1)
     style = Style(rng)
-    # Fronts: side of the hinge (1: at +Y, -1: at -Y, 0: a drawer), then y and z from low to high.
     top, side = foot + tall, int(rng.choice([-1, 1]))
-    fronts: list[tuple[int, float, float, float, float]] = []
+    fronts: list[Front] = []
     if layout == "single":
         fronts.append((side, -half, half, foot, top))
     elif layout == "stacked":
@@ -91,14 +93,7 @@ def build(rng: Rng) -> Assembly:
 
 
 def _body(
-    rng: Rng,
-    half: float,
-    depth: float,
-    low: float,
-    high: float,
-    style: Style,
-    fronts: list[tuple[int, float, float, float, float]],
-    small: bool,
+    rng: Rng, half: float, depth: float, low: float, high: float, style: Style, fronts: Sequence[Front], small: bool
 ) -> Solid:
     wall = style.wall
     solid = rounded_shell((GAP, -half, low), (depth, half, high), wall, min(style.corner, 0.9 * wall), 2)

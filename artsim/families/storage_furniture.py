@@ -124,16 +124,10 @@ def _fill(rng: Rng, cell: Cell, style: Style, drawers: float, must_move: bool) -
     chances["drawer"] += sum(chances.values()) <= 0.0
     total = np.sum(list(chances.values()))
     what = pick(rng, {name: chance / total for name, chance in chances.items()})
-    if what == "drawer":
-        return fronts.drawer(rng, cell, style)
-    if what == "double":
-        return fronts.double_door(rng, cell, style)
-    if what == "sliding":
-        return fronts.sliding_doors(rng, cell, style)
-    if what == "open":
-        return fronts.shelves(rng, cell, style)
-    if what == "fixed":
-        return fronts.fixed(cell, style)
+    plain = {"drawer": fronts.drawer, "double": fronts.double_door, "sliding": fronts.sliding_doors,
+             "open": fronts.shelves, "fixed": fronts.fixed}  # fmt: skip
+    if what in plain:
+        return plain[what](rng, cell, style)
     if what == "flap":
         return fronts.door(rng, cell, style, "top" if rng.random() < 0.7 else "bottom")
     outside = [name for name, outer in (("left", cell.outer_high[0]), ("right", cell.outer_low[0])) if outer]

@@ -13,7 +13,7 @@ import numpy as np
 from artsim.common.elementary import arctan2, cos, power, sin
 from artsim.families.details import bow_handle, rounded_tray
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
-from artsim.making.outlines import about, lifted, rounded_rectangle
+from artsim.making.outlines import Vector, about, lifted, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, rod, tube, union
 from artsim.model.kinematics import Array
 
@@ -177,14 +177,7 @@ def _briefcase(rng: Rng) -> Assembly:
     return case
 
 
-def _bail(
-    center: tuple[float, float, float],
-    half: float,
-    height: float,
-    wire: float,
-    toward: tuple[float, float, float],
-    drop: float,
-) -> tuple[Solid, Solid]:
+def _bail(center: Vector, half: float, height: float, wire: float, toward: Vector, drop: float) -> tuple[Solid, Solid]:
     """Handle that turns about the Y axis through ``center`` between two pairs of lugs; the lugs end ``drop`` away."""
     x, _, z = center
     angles = np.linspace(0.0, np.pi, 15)

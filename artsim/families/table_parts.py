@@ -85,7 +85,7 @@ def _fill(rng: Rng, cell: Cell, style: Style, doors: float, must_move: bool) -> 
     """What a cell holds."""
     width, height = cell.sides
     if not must_move and rng.random() < 0.12:
-        return fronts.shelves(rng, cell, style) if rng.random() < 0.7 else fronts.fixed(cell, style)
+        return fronts.shelves(rng, cell, style) if rng.random() < 0.7 else fronts.fixed(rng, cell, style)
     if height > 0.2 and width > 0.05 and rng.random() < doors * (1.0 if height > 0.3 else 0.6):
         if width > 0.42 and rng.random() < 0.75:
             return (

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.families.details import bar_handle, grid_panel, swing_limits
+from artsim.families.fronts import HINGES
 from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
 from artsim.making.outlines import about
 from artsim.making.solids import Solid, box, cylinder, frame
@@ -16,13 +17,6 @@ from artsim.model.kinematics import Array
 
 GAP = 0.003
 PANE = 0.006
-HINGES = {
-    "left": (1, 1, (0, 0, -1)),
-    "right": (1, -1, (0, 0, 1)),
-    "top": (2, 1, (0, 1, 0)),
-    "bottom": (2, -1, (0, -1, 0)),
-}
-"""Of each hinge: the axis of the front across which it lies, its end there, and its direction."""
 
 
 def build(rng: Rng) -> Assembly:
