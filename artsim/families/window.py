@@ -19,6 +19,22 @@ GAP = 0.003
 PANE = 0.006
 
 
+class _Style:
+    """What the sashes of a window share."""
+
+    def __init__(self, rng: Rng, most: float) -> None:
+        self.thick = min(rng.uniform(0.03, 0.045), most)
+        self.columns = pick(rng, {1: 0.6, 2: 0.25, 3: 0.15})
+        self.rows = pick(rng, {1: 0.55, 2: 0.3, 3: 0.15})
+        self.rail = rng.uniform(0.035, 0.065)
+
+    def sash(self, low: Array, high: Array) -> Solid:
+        """A sash with these corners: a frame around panes."""
+        columns = np.linspace(low[1] + self.rail, high[1] - self.rail, self.columns + 1)[1:-1]
+        rows = np.linspace(low[2] + self.rail, high[2] - self.rail, self.rows + 1)[1:-1]
+        return grid_panel(low, high, [self.rail] * 4, columns, rows, 0.022, PANE)
+
+
 def build(rng: Rng) -> Assembly:
     """A window, mostly closed at rest."""
     kind = pick(rng, {"hinged": 0.6, "sliding": 0.22, "hung": 0.18})
@@ -29,20 +45,14 @@ def build(rng: Rng) -> Assembly:
     height = rng.uniform(0.5, 1.8) if kind != "hung" else width * rng.uniform(1.3, 2.0)
     bar = rng.uniform(0.035, 0.065)
     depth = rng.uniform(0.05, 0.22)
-    sash = float(rng.uniform(0.03, 0.045))
+    style = _Style(rng, 1.0 if kind == "hinged" else 0.035)
     if kind != "hinged":
-        sash = min(sash, 0.035)
-        depth = max(depth, (count if kind == "sliding" else 2) * (sash + GAP) + 0.015)
-    glazing = pick(rng, {1: 0.6, 2: 0.25, 3: 0.15}), pick(rng, {1: 0.55, 2: 0.3, 3: 0.15})
-    rail = rng.uniform(0.035, 0.065)
-    window = Assembly(density=900.0)
-    body = _frame(rng, width, height, depth, bar)
-    if kind == "hinged":
-        _hinged(rng, window, body, width, height, depth, sash, rail, count, glazing)
-    elif kind == "sliding":
-        _sliding(rng, window, body, width, height, depth, sash, rail, count, glazing)
+        depth = max(depth, (count if kind == "sliding" else 2) * (style.thick + GAP) + 0.015)
+    window = Assembly("frame", _frame(rng, width, height, depth, bar), 700.0)
+    if kind == "hung":
+        _hung(rng, window, width, height, depth, style)
     else:
-        _hung(rng, window, body, width, height, depth, sash, rail, glazing)
+        {"hinged": _hinged, "sliding": _sliding}[kind](rng, window, width, height, depth, style, count)
     return window
 
 
@@ -66,24 +76,15 @@ def _frame(rng: Rng, width: float, height: float, depth: float, bar: float) -> S
     return solid
 
 
-def _sash(low: Array, high: Array, rail: float, glazing: tuple[int, int]) -> Solid:
-    columns = np.linspace(low[1] + rail, high[1] - rail, glazing[0] + 1)[1:-1]
-    rows = np.linspace(low[2] + rail, high[2] - rail, glazing[1] + 1)[1:-1]
-    return grid_panel(low, high, [rail] * 4, list(columns), list(rows), 0.022, PANE)
-
-
-def _hinged(
-    rng: Rng, window: Assembly, body: Solid, width: float, height: float, depth: float, sash: float,
-    rail: float, count: int, glazing: tuple[int, int],
-) -> None:  # fmt: skip
+def _hinged(rng: Rng, window: Assembly, width: float, height: float, depth: float, style: _Style, count: int) -> None:
     """Lights side by side between mullions; each hinged or fixed. Two may meet without a mullion between them."""
     x0 = -depth / 2
     mullion = rng.uniform(0.03, 0.06)
     top = height
     if rng.random() < 0.2 and height > 0.9:  # a fixed light above
         top = height * rng.uniform(0.68, 0.78)
-        body += box((x0, depth / 2), width / 2 + 0.001, (top, top + mullion))
-        body += box(PANE / 2, width / 2 + 0.001, (top, height + 0.001))
+        window.body += box((x0, depth / 2), width / 2 + 0.001, (top, top + mullion))
+        window.body += box(PANE / 2, width / 2 + 0.001, (top, height + 0.001))
     meeting = count == 2 and rng.random() < 0.45
     edges = np.linspace(-width / 2, width / 2, count + 1)
     sideways = rng.random() < 0.65 or meeting
@@ -97,37 +98,36 @@ def _hinged(
         first = edges[k] + (mullion / 2 if k > 0 and not meeting else 0.0)
         last = edges[k + 1] - (mullion / 2 if k < count - 1 and not meeting else 0.0)
         if k < count - 1 and not meeting:
-            body += box((x0, depth / 2), about(edges[k + 1], mullion / 2), (-0.001, top + 0.001))
+            window.body += box((x0, depth / 2), about(edges[k + 1], mullion / 2), (-0.001, top + 0.001))
         if k == fixed:
             low, high = (
                 np.array([x0 + 0.01, first - 0.001, -0.001]),
-                np.array([x0 + 0.01 + sash, last + 0.001, top + 0.001]),
+                np.array([x0 + 0.01 + style.thick, last + 0.001, top + 0.001]),
             )
-            body += _sash(low, high, rail, glazing)
+            window.body += style.sash(low, high)
             continue
         hinge = {0: "right", count - 1: "left"}.get(k, own) if sideways and count > 1 else own
-        low, high = np.array([x0, first + GAP, GAP]), np.array([x0 + sash, last - GAP, top - GAP])
+        low, high = np.array([x0, first + GAP, GAP]), np.array([x0 + style.thick, last - GAP, top - GAP])
         outer = (hinge == "left" and k == count - 1) or (hinge == "right" and k == 0)
         leaves.append((hinge, low, high, outer))
-    window.add("frame", body, density=700.0)
     for number, (hinge, low, high, outer) in enumerate(leaves):
         name = "sash" if len(leaves) == 1 else f"sash_{number}"
-        _leaf(window, name, hinge, low, high, rail, glazing, limit, outer, lever_turns)
+        _leaf(window, name, hinge, low, high, style, limit, outer, lever_turns)
         if ajar > 0 and number == 0:
             window.open_at_rest(name, ajar * min(limit, 1.2))
 
 
 def _leaf(
-    window: Assembly, name: str, hinge: str, low: Array, high: Array, rail: float, glazing: tuple[int, int],
-    limit: float, outer: bool, lever_turns: bool,
+    window: Assembly, name: str, hinge: str, low: Array, high: Array, style: _Style, limit: float, outer: bool,
+    lever_turns: bool,
 ) -> None:  # fmt: skip
     """A hinged sash, mostly with a handle that turns on it, on the edge that opens."""
-    across, end, axis = HINGES[hinge]
+    rail, (across, end, axis) = style.rail, HINGES[hinge]
     along = 3 - across
     edge = high[across] if end > 0 else low[across]
     foot = 0.5 * (low + high)
     foot[0], foot[across] = low[0], edge - end * (high[across] - low[across] - rail / 2)
-    solid = _sash(low, high, rail, glazing)
+    solid = style.sash(low, high)
     half = np.array([0.005, min(0.011, 0.35 * rail), min(0.011, 0.35 * rail)])
     half[along] = 0.03
     solid += box(foot - half - (0.004, 0, 0), foot + half, fillet=0.003, steps=2)
@@ -135,7 +135,7 @@ def _leaf(
     origin[0], origin[across] = low[0] - 0.001, edge
     stay, most = swing_limits(abs(foot[across] - edge) - 0.12, 0.05)  # whichever way the lever points
     angle = min(limit, most if outer else stay)
-    window.add(name, solid, revolute("frame", axis, tuple(origin), 0.0, angle), label="sash")
+    window.add(name, solid, revolute("frame", axis, tuple(origin), 0.0, angle), label="sash", density=900.0)
 
     if not lever_turns:
         return
@@ -152,52 +152,46 @@ def _leaf(
     window.add(name.replace("sash", "handle"), lever, joint, label="handle", density=2500.0)
 
 
-def _sliding(
-    rng: Rng, window: Assembly, body: Solid, width: float, height: float, depth: float, sash: float,
-    rail: float, count: int, glazing: tuple[int, int],
-) -> None:  # fmt: skip
+def _sliding(rng: Rng, window: Assembly, width: float, height: float, depth: float, style: _Style, count: int) -> None:
     """Sashes on as many tracks; each may slide over all others."""
-    window.add("frame", body, density=700.0)
-    pitch = width / count
+    rail, pitch = style.rail, width / count
     order = rng.permutation(count)
     for k in range(count):
-        x = -depth / 2 + 0.006 + order[k] * (sash + GAP)
+        x = -depth / 2 + 0.006 + order[k] * (style.thick + GAP)
         overlap = rail / 2
         first = -width / 2 + k * pitch - (overlap if k > 0 else -GAP)
         last = -width / 2 + (k + 1) * pitch + (overlap if k < count - 1 else -GAP)
-        low, high = np.array([x, first, GAP]), np.array([x + sash, last, height - GAP])
-        solid = _sash(low, high, rail, glazing)
+        low, high = np.array([x, first, GAP]), np.array([x + style.thick, last, height - GAP])
+        solid = style.sash(low, high)
         y = first + rail / 2 if k == 0 else last - rail / 2
         solid += box((x - 0.0018, x + 0.002), (y - 0.3 * rail, y + 0.3 * rail), (0.4 * height, 0.4 * height + 0.14))
         left = last - width / 2 + GAP  # travel to both sides, towards +Y and -Y
         joint = prismatic(
             "frame", (0, 1, 0), min(0.0, -(first + width / 2 - GAP)), max(0.0, -left), tuple(0.5 * (low + high))
         )
-        window.add(f"sash_{k}", solid, joint)
+        window.add(f"sash_{k}", solid, joint, density=900.0)
 
 
-def _hung(
-    rng: Rng, window: Assembly, body: Solid, width: float, height: float, depth: float, sash: float,
-    rail: float, glazing: tuple[int, int],
-) -> None:  # fmt: skip
+def _hung(rng: Rng, window: Assembly, width: float, height: float, depth: float, style: _Style) -> None:
     """A lower sash in front that slides up, and an upper one behind it that slides down or is fixed."""
+    rail = style.rail
     both = rng.random() < 0.6
     meet = height * rng.uniform(0.45, 0.55)
     solids = []
     for track, (first, last) in enumerate(((GAP, meet + rail / 2), (meet - rail / 2, height - GAP))):
-        x = -depth / 2 + 0.006 + track * (sash + GAP)
-        low, high = np.array([x, -width / 2 + GAP, first]), np.array([x + sash, width / 2 - GAP, last])
-        solid = _sash(low, high, rail, glazing)
+        x = -depth / 2 + 0.006 + track * (style.thick + GAP)
+        low, high = np.array([x, -width / 2 + GAP, first]), np.array([x + style.thick, width / 2 - GAP, last])
+        solid = style.sash(low, high)
         if track == 0:  # two lifts on the lower rail
             z = first + rail / 2
             for y in (-0.25 * width, 0.25 * width):
                 solid += bar_handle((x, y - 0.04, z), (x, y + 0.04, z), (-1, 0, 0), 0.022, 0.005)
         solids.append((solid, tuple(0.5 * (low + high))))
     if not both:
-        stop = (-depth / 2 + 0.006 + sash + 2 * GAP, depth / 2 - 0.002), (-width / 2 - 0.001, -width / 2 + 0.01)
-        body += solids[1][0] + box(*stop, (meet, height + 0.001))
-    window.add("frame", body, density=700.0)
+        stop = (-depth / 2 + 0.006 + style.thick + 2 * GAP, depth / 2 - 0.002), (-width / 2 - 0.001, -width / 2 + 0.01)
+        window.body += solids[1][0] + box(*stop, (meet, height + 0.001))
     up = prismatic("frame", (0, 0, 1), 0.0, height - meet - rail / 2 - GAP, solids[0][1])
-    window.add("sash_0" if both else "sash", solids[0][0], up)
+    window.add("sash_0" if both else "sash", solids[0][0], up, density=900.0)
     if both:
-        window.add("sash_1", solids[1][0], prismatic("frame", (0, 0, -1), 0.0, meet - rail / 2 - GAP, solids[1][1]))
+        down = prismatic("frame", (0, 0, -1), 0.0, meet - rail / 2 - GAP, solids[1][1])
+        window.add("sash_1", solids[1][0], down, density=900.0)
