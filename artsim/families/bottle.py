@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from artsim.common.elementary import cos, sin
+from artsim.common.elementary import cos
 from artsim.families.details import cheeks
 from artsim.families.vessels import GAP, Level, cap, cross_section, dome, grip_loop, moulded, neck, pump_head, ribs
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute, screw
-from artsim.making.outlines import UP
+from artsim.making.outlines import UP, arch
 from artsim.making.solids import Solid, box, ellipsoid, hull_of, ring, rod, tube
 
 DENSITY = 300.0  # kg/m^3, as the pieces are solid and real ones are hollow
@@ -191,10 +191,8 @@ def _screw_cap(rng: Rng, bottle: Assembly, mouth: Mouth) -> None:
         lid += rod(0, 0, (high - 0.0005, high + 0.5 * radius), 0.75 * radius, 0.35 * radius)
         lid += rod(0, 0, (high, high + radius), 0.3 * radius) + dome(0.42 * radius, high + radius, 0.004)
     elif style < 0.4:  # a loop to carry it by
-        angles = np.linspace(0.0, np.pi, 8)
         r = 0.7 * radius
-        path = [(0.0, r * cos(a), high - 0.001 + 1.1 * r * sin(a)) for a in angles.tolist()]
-        lid += tube(path, 0.16 * radius, 8)
+        lid += tube([(0.0, y, high - 0.001 + z) for y, z in arch(r, 1.1 * r, 8)], 0.16 * radius, 8)
     if rng.random() < 0.3:  # a bead below the cap
         bottle.body += ring((0, 0, mouth.foot - 0.0005), UP, 0.6 * mouth.bore, 1.12 * radius, 0.001, 20)
     bottle.add("lid", lid, _closing(rng, mouth, high - low))

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.common.elementary import cos, sin
 from artsim.families.details import front_handle, side_hinge
 from artsim.families.shopping_carts import shopping_cart
 from artsim.families.wagons import hand_cart, wagon
 from artsim.families.wheels import GAP, STEEL, Wheels, bar
 from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
-from artsim.making.outlines import UP, about
+from artsim.making.outlines import UP, about, arch
 from artsim.making.solids import Solid, box, hull_of, posts, rod, tray, tube, union
 
 
@@ -131,9 +130,7 @@ def _truck_handle(rng: Rng, shape: str, x: float, half: float, height: float, r:
     top = height + rise
     legs = union(tube([(front, s * y, low), (front, s * y, top - 0.03)], r, 8) for s in (-1.0, 1.0))
     if shape == "bow":
-        angles = np.linspace(0.0, np.pi, 9)
-        arch = [(front, y * cos(a), top - 0.03 + 0.7 * y * sin(a)) for a in angles.tolist()]
-        return legs + tube(arch, r, 8)
+        return legs + tube([(front, u, top - 0.03 + v) for u, v in arch(y, 0.7 * y, 9)], r, 8)
     if shape == "bar":
         return legs + rod(front, (-1.15 * y, 1.15 * y), top - 0.03, 1.4 * r, sections=12)
     grips = union(tube([(front, s * y, top - 0.035), (front + 0.02, s * y, top), (front + 0.14, s * y, top + 0.02)],

@@ -15,7 +15,7 @@ from artsim.families.clock_faces import CLOCKWISE, add_hands, dial_plate, glass_
 from artsim.families.details import side_hinge
 from artsim.families.hanging_clocks import cuckoo_clock, pendulum_clock, wall_clock
 from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
-from artsim.making.outlines import FRONT, about
+from artsim.making.outlines import FRONT, about, arch
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull_of, prism, ring, rod, tube, union
 
 GAP = 0.001
@@ -64,9 +64,8 @@ def _mantel_clock(rng: Rng) -> Assembly:
             body += box((-0.012, deep + 0.008), 1.12 * half, (half - 0.001, half + 0.1 * half), fillet=0.004)
         if rng.random() < 0.4:  # a handle on top
             top = half * (1.1 if kind == "block" else 1.0)
-            angles = np.linspace(0.0, np.pi, 8)
-            arch = [(0.5 * deep, 0.4 * half * cos(a), top - 0.004 + 0.35 * half * sin(a)) for a in angles.tolist()]
-            body += tube(arch, 0.04 * half, 8) if kind == "block" else Solid()
+            bow = [(0.5 * deep, y, top - 0.004 + z) for y, z in arch(0.4 * half, 0.35 * half, 8)]
+            body += tube(bow, 0.04 * half, 8) if kind == "block" else Solid()
     base = half * (rng.uniform(1.05, 1.4) if kind != "tambour" else 2.65)
     if kind != "drum" and rng.random() < 0.75:
         body += box((-0.014, deep + 0.008), base, (low - 0.15 * half, low + 0.002), fillet=0.004)
@@ -196,9 +195,8 @@ def _alarm_clock(rng: Rng) -> Assembly:
                           for h, w in levels))  # fmt: skip
     lean = half * cos(spread) + size
     if rng.random() < 0.6:
-        angles = np.linspace(0.0, np.pi, 8)
         span = half * sin(spread) + 0.5 * size
-        body += tube([(middle, span * cos(a), lean + 0.2 * size + 0.9 * size * sin(a)) for a in angles.tolist()], r, 8)
+        body += tube([(middle, y, lean + 0.2 * size + z) for y, z in arch(span, 0.9 * size, 8)], r, 8)
     clock = Assembly("body", body, 1500.0)
     add_hands(rng, clock, 0.95 * radius, "body")
     room = half * sin(spread) - size * cos(spread)
@@ -229,8 +227,8 @@ def _watch(rng: Rng) -> Assembly:
     body += rod(0.3 * deep, 0, (0.95 * half, neck), 0.1 * radius, sections=12)
     x = 0.3 * deep
     crown = rod(x, 0, (neck + 0.0004, neck + 0.22 * radius), 0.14 * radius, sections=14)
-    bow = tube([(x, 0.34 * radius * cos(a), neck + 0.05 * radius + 0.42 * radius * sin(a))
-                for a in np.linspace(-0.6, np.pi + 0.6, 11).tolist()], 0.04 * radius, 8)  # fmt: skip
+    loop = arch(0.34 * radius, 0.42 * radius, 11, -0.6, np.pi + 0.6)
+    bow = tube([(x, y, neck + 0.05 * radius + z) for y, z in loop], 0.04 * radius, 8)
     fixed = rng.random() < 0.5
     ears = union(cylinder((x, s * 0.08 * radius, neck - 0.08 * radius), (x, s * 0.3 * radius, neck - 0.18 * radius),
                           0.05 * radius, sections=8) for s in (-1.0, 1.0))  # fmt: skip

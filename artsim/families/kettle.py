@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from artsim.common.elementary import cos, sin
+from artsim.common.elementary import cos
 from artsim.common.products import unit
 from artsim.families.details import cheeks
 from artsim.families.vessels import Level, cross_section, dome, grip_loop, moulded
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute, screw
-from artsim.making.outlines import UP
+from artsim.making.outlines import UP, arch
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, ring, rod, tube
 from artsim.model.kinematics import Array
 
@@ -179,8 +179,7 @@ def _lid(rng: Rng, pot: Pot, joint: str, low: bool) -> tuple[Solid, float]:
         lid += rod(0, 0, (top + 0.6 * size, top + size), 1.2 * size, size)
         top += size
     elif kind == "ring":
-        angles = np.linspace(-0.3, np.pi + 0.3, 9)
-        path = [(size * cos(a), 0.0, top + 0.4 * size + size * sin(a)) for a in angles.tolist()]
+        path = [(x, 0.0, top + 0.4 * size + h) for x, h in arch(size, size, 9, -0.3, np.pi + 0.3)]
         lid += tube([(size * cos(0.3), 0, foot - 0.1 * rise), *path, (-size * cos(0.3), 0, foot - 0.1 * rise)],
                     0.2 * size, 8)  # fmt: skip
         top += 1.6 * size
@@ -234,8 +233,7 @@ def _bow_path(room: float, reach: float, lift: float, square: bool) -> list[tupl
     if square:
         edge = 0.75 * reach
         return [(-reach, lift), (-edge, room), (edge, room), (reach, lift)]
-    angles = np.linspace(np.pi, 0.0, 11)
-    return [(reach * cos(a), lift + (room - lift) * sin(a)) for a in angles.tolist()]
+    return [(x, lift + z) for x, z in arch(reach, room - lift, 11, np.pi, 0.0)]
 
 
 def _bow(rng: Rng, pot: Pot, room: float) -> tuple[Solid, float]:
@@ -271,8 +269,7 @@ def _swinging_bow(rng: Rng, kettle: Assembly, pins: Pins, pot: Pot) -> None:
         path = [(0.0, s * y * pins.reach, pins.z + h * rise) for s, y, h in
                 ((-1, 1, 0), (-1, 1, 0.65), (-1, 0.75, 1), (1, 0.75, 1), (1, 1, 0.65), (1, 1, 0))]  # fmt: skip
     else:
-        angles = np.linspace(np.pi, 0.0, 13)
-        path = [(0.0, pins.reach * cos(a), pins.z + rise * sin(a)) for a in angles.tolist()]
+        path = [(0.0, y, pins.z + z) for y, z in arch(pins.reach, rise, 13, np.pi, 0.0)]
     bow = tube(path, r, 10)
     if rng.random() < 0.75:
         bow += tube([(0, -0.4 * pins.reach, pins.top), (0, 0.4 * pins.reach, pins.top)], r * rng.uniform(1.5, 2.4), 14)
@@ -298,10 +295,8 @@ def _back_grip(rng: Rng, pot: Pot, hinged: bool, kind: str) -> Solid:
     else:
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         base = pot.radius(middle)
-        points = [start]
-        for a in np.linspace(0.4 * np.pi, -0.4 * np.pi, 6).tolist():
-            points.append((base + (reach - base) * cos(a), middle + half * sin(a)))
-        points.append(end)
+        round_it = arch(reach - base, half, 6, 0.4 * np.pi, -0.4 * np.pi)
+        points = [start, *((base + x, middle + z) for x, z in round_it), end]
     return grip_loop(points, wide, thick)
 
 

@@ -7,7 +7,6 @@ lid, hinges.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -24,19 +23,15 @@ Moving = tuple[str, Solid, JointSpec]
 BACK = (0.0, 1.0, 0.0)  # a positive turn about this axis lifts the front edge
 
 
-@dataclass(frozen=True)
 class _Cover:
     """Seat and lid; metres."""
 
-    over: float  # how far they reach beyond the bowl
-    thick: float  # of the seat
-    lid: float  # thickness of the lid
-    axis: float  # distance of the hinges' axis from the seat's end
-
-    @property
-    def rise(self) -> float:
-        """Of the lid's top over the axis."""
-        return 0.5 * self.thick + GAP + self.lid
+    def __init__(self, rng: Rng) -> None:
+        self.over = rng.uniform(0.0, 0.012)  # how far they reach beyond the bowl
+        self.thick = rng.uniform(0.014, 0.028)  # of the seat
+        self.lid = rng.uniform(0.012, 0.03)  # thickness of the lid
+        self.axis = rng.uniform(0.015, 0.03)  # distance of the hinges' axis from the seat's end
+        self.rise = 0.5 * self.thick + GAP + self.lid  # of the lid's top over the axis
 
 
 def build(rng: Rng) -> Assembly:
@@ -46,14 +41,12 @@ def build(rng: Rng) -> Assembly:
     power = rng.choice([2.0, rng.uniform(2.0, 2.6), rng.uniform(3.0, 6.0)], p=[0.4, 0.4, 0.2])
     tank = pick(rng, {"low": 0.7, "high": 0.1, "wall": 0.2})
     hung = tank == "wall" and rng.random() < 0.7
-    cover = _Cover(
-        rng.uniform(0.0, 0.012), rng.uniform(0.014, 0.028), rng.uniform(0.012, 0.03), rng.uniform(0.015, 0.03)
-    )
+    cover = _Cover(rng)
     lean = rng.uniform(0.0, 0.2)  # beyond upright
     # Behind the axis there is room for the lid as it stands up, and for a lever on the cistern.
     back = 0.5 * length + cover.over + cover.axis + cover.rise + 0.045 + lean * (length + 0.05)
     body = _bowl(rng, length, width, height, power, back, hung)
-    moving: list[tuple[str, Solid, JointSpec]] = []
+    moving: list[Moving] = []
     if tank == "low":
         body += _low_cistern(rng, moving, back, width, height)
     elif tank == "high":

@@ -36,6 +36,11 @@ def turns(count: int, start: float = 0.0) -> list[float]:
     return [2.0 * np.pi * (k + start) / count for k in range(count)]
 
 
+def arch(half: float, rise: float, count: int, first: float = 0.0, last: float = np.pi) -> list[tuple[float, float]]:
+    """Points of an ellipse about 0 between two angles: by default over the top, from one side to the other."""
+    return [(half * cos(a), rise * sin(a)) for a in np.linspace(first, last, count).tolist()]
+
+
 def rotation_about(axis: Vector, angle: float) -> Array:
     """(3, 3) rotation by ``angle`` radians about an axis of any length (Rodrigues' formula)."""
     cross = cross_matrix(unit(axis))
