@@ -171,22 +171,13 @@ def wire_shelf(low: Vector, high: Vector, bars: int, wire: float) -> Solid:
 
 
 def rounded_tray(
-    low: Vector,
-    high: Vector,
-    wall: float,
-    radius: float,
-    profile: ArrayLike = ((0.0, 0.0), (1.0, 0.0)),
-    axis: int = 2,
-    side: int = 1,
-    floor: float | None = None,
-    steps: int = 3,
-) -> Solid:
+    low: Vector, high: Vector, wall: float, radius: float, profile: ArrayLike = ((0.0, 0.0), (1.0, 0.0)),
+    axis: int = 2, side: int = 1, floor: float | None = None, steps: int = 3,
+) -> Solid:  # fmt: skip
     """Open box with round corners: a floor and one wall around.
 
     Parameters
     ----------
-    low, high : (3,) float
-        Outer corners.
     wall, floor : float
         Thickness; the floor is as thick as the wall by default, and 0 leaves it out.
     radius : float
@@ -196,8 +187,6 @@ def rounded_tray(
         Tapered bins and bevelled shells have more than zeros.
     axis, side : int
         It is open towards ``side`` (1 or -1) of coordinate ``axis``: upward by default.
-    steps : int
-        Segments of a quarter circle.
     """
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     depth = wall if floor is None else floor

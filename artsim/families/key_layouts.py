@@ -17,9 +17,9 @@ Cell = tuple[float, float, float, float]
 """Centre and size of a key along u and v, in key pitches."""
 
 
-def grid_layout(u: float, v: float, columns: int, rows: int) -> list[list[Cell]]:
-    """Single keys, with the upper left corner of the first at (u, v)."""
-    return [[(u + c + 0.5, v - r - 0.5, 1.0, 1.0)] for r in range(rows) for c in range(columns)]
+def grid_layout(v: float, columns: int, rows: int) -> list[list[Cell]]:
+    """Single keys, with the upper left corner of the first at (0, v)."""
+    return [[(c + 0.5, v - r - 0.5, 1.0, 1.0)] for r in range(rows) for c in range(columns)]
 
 
 def key_row(rng: Rng, u: float, v: float, units: float, space: bool) -> list[Cell]:
@@ -72,7 +72,7 @@ def compact_layout(rng: Rng) -> list[list[Cell]]:
 def number_layout(rng: Rng) -> list[list[Cell]]:
     """A number pad; at times with a double 0 and tall keys."""
     rows, columns = int(rng.integers(4, 7)), int(rng.integers(3, 6))
-    groups = grid_layout(0.0, float(rows), columns, rows)
+    groups = grid_layout(float(rows), columns, rows)
     if rng.random() < 0.7:
         del groups[-columns : -columns + 2]
         groups.append([(1.0, 0.5, 2.0, 1.0)])
@@ -86,7 +86,7 @@ def number_layout(rng: Rng) -> list[list[Cell]]:
 
 def macro_layout(rng: Rng) -> list[list[Cell]]:
     """A few keys in a grid."""
-    return grid_layout(0.0, 0.0, int(rng.integers(1, 7)), int(rng.integers(1, 5)))
+    return grid_layout(0.0, int(rng.integers(1, 7)), int(rng.integers(1, 5)))
 
 
 def extent(groups: Sequence[Sequence[Cell]]) -> Array:
@@ -100,5 +100,5 @@ def half_layout(rng: Rng) -> list[list[Cell]]:
     """Keys of one half: single ones, or rows."""
     rows, units = int(rng.integers(3, 6)), float(rng.integers(4, 8))
     if rows * units <= 0.5 * MOST_KEYS:
-        return grid_layout(0.0, float(rows), int(units), rows)
+        return grid_layout(float(rows), int(units), rows)
     return [key_row(rng, 0.0, float(rows - r), units, False) for r in range(rows)]

@@ -100,14 +100,14 @@ def key_cells(
 
 def add_keypad(
     rng: Rng, phone: Assembly, parent: str, face: Face, half: float, v: tuple[float, float],
-    height: float, first: int = 0,
+    height: float,
 ) -> int:  # fmt: skip
     """Keys in three or four columns over a part of a face, function keys above them; returns the next free number."""
     kind = pick(rng, ["square", "pill", "round"])
     columns, rows = (3, 4) if rng.random() < 0.7 else (int(rng.integers(3, 6)), int(rng.integers(2, 5)))
     fill = rng.uniform(0.6, 0.9, 2)
     travel = min(rng.uniform(0.0003, 0.0006), height - 0.0008)
-    number, low, high = first, v[0], v[1]
+    number, low, high = 0, v[0], v[1]
     if rng.random() < 0.7:
         split = high - (high - low) * rng.uniform(0.15, 0.3)
         number = add_function_keys(rng, phone, parent, face, half, (split, high), height, number)

@@ -49,7 +49,7 @@ def _slab(rng: Rng, half: float, x: tuple[float, float], z: tuple[float, float],
     return loft(cross_sections(z[0] + levels * (z[1] - z[0]), fronts, backs, halves, rng.uniform(0.1, 0.8)))
 
 
-def _side_keys(rng: Rng, phone: Assembly, parent: str, half: float, x: float, z: tuple[float, float],
+def _side_keys(rng: Rng, phone: Assembly, half: float, x: float, z: tuple[float, float],
                thick: float, sides: Sequence[float] = (-1.0, 1.0)) -> None:  # fmt: skip
     """Keys on the right (-1) and left (1) edges of an upright body."""
     for side in sides:
@@ -58,7 +58,7 @@ def _side_keys(rng: Rng, phone: Assembly, parent: str, half: float, x: float, z:
             v = z[0] + (0.62 + 0.14 * k) * (z[1] - z[0])
             outline = key_outline("pill", (0.3 * thick, rng.uniform(0.05, 0.11) * (z[1] - z[0])), 8)
             name = f"{'left' if side > 0 else 'right'}_key_{k}"
-            add_key(phone, parent, name, face, (0.0, v), outline, 0.0014, 0.0004)
+            add_key(phone, "body", name, face, (0.0, v), outline, 0.0014, 0.0004)
 
 
 def _size(rng: Rng) -> tuple[float, float, float]:
@@ -104,7 +104,7 @@ def _bar(rng: Rng, phone: Assembly) -> None:
     phone.add("body", body)
     height = rng.uniform(0.0011, 0.0026)
     add_keypad(rng, phone, "body", front_face(0.0), inner, (0.1 * length, split), height)
-    _side_keys(rng, phone, "body", half, 0.5 * thick, (0.0, length), thick)
+    _side_keys(rng, phone, half, 0.5 * thick, (0.0, length), thick)
     _aerial(rng, phone, half, 0.5 * thick, length, thick)
     _stand(rng, phone, half, thick, length)
 
@@ -139,7 +139,7 @@ def _flip(rng: Rng, phone: Assembly) -> None:
         lid += box(deep, size, about(z, size), fillet=0.3 * size, axis=0, steps=2)
     phone.add("lid", lid, revolute("body", (0, 1, 0), (plane, 0, pivot), 0.0, rng.uniform(1.6, 2.9)))
     add_keypad(rng, phone, "body", front_face(0.0), 0.8 * half, (0.08 * top, 0.78 * (top - 4.0 * radius)), height)
-    _side_keys(rng, phone, "body", half, 0.5 * lower, (0.0, top - 4.0 * radius), lower)
+    _side_keys(rng, phone, half, 0.5 * lower, (0.0, top - 4.0 * radius), lower)
 
 
 def _slider(rng: Rng, phone: Assembly) -> None:
@@ -169,7 +169,7 @@ def _slider(rng: Rng, phone: Assembly) -> None:
     number = add_keypad(rng, phone, "body", front_face(0.0), 0.78 * half, keys, height)
     front = front_face(plane - upper)
     add_function_keys(rng, phone, "lid", front, 0.7 * half, (0.08 * length, 0.24 * length), 0.0014, number)
-    _side_keys(rng, phone, "body", half, 0.5 * lower, (0.0, length), lower)
+    _side_keys(rng, phone, half, 0.5 * lower, (0.0, length), lower)
 
 
 def _swivel(rng: Rng, phone: Assembly) -> None:
@@ -188,7 +188,7 @@ def _swivel(rng: Rng, phone: Assembly) -> None:
     side = float(rng.choice([-1.0, 1.0]))
     phone.add("lid", lid, revolute("body", (side, 0, 0), (plane, 0, pivot), 0.0, rng.uniform(1.57, 3.2)))
     add_keypad(rng, phone, "body", front_face(0.0), 0.78 * half, (0.06 * length, pivot - 0.75 * half), height)
-    _side_keys(rng, phone, "body", half, 0.5 * lower, (0.0, length), lower)
+    _side_keys(rng, phone, half, 0.5 * lower, (0.0, length), lower)
 
 
 def _fold(rng: Rng, phone: Assembly) -> None:
@@ -211,7 +211,7 @@ def _fold(rng: Rng, phone: Assembly) -> None:
     lid += rod(0, y, (first[1] + GAP, first[4] - GAP), radius, sections=16)
     lid += box((-0.5 * leaf - 0.25 * gap, -0.5 * gap), (reach[0], reach[1]), (first[1] + GAP, first[4] - GAP))
     phone.add("lid", lid, revolute("body", (0, 0, -side), (0, y, 0), 0.0, rng.uniform(1.6, 3.1)), density=1500.0)
-    _side_keys(rng, phone, "body", half, 0.5 * leaf + 0.25 * gap, (0.0, length), leaf, (-side,))
+    _side_keys(rng, phone, half, 0.5 * leaf + 0.25 * gap, (0.0, length), leaf, (-side,))
 
 
 def _smartphone(rng: Rng, phone: Assembly) -> None:
@@ -234,7 +234,7 @@ def _smartphone(rng: Rng, phone: Assembly) -> None:
         face = Face(np.array([0.5 * thick, 0.0, length]), np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0]))
         outline = key_outline("pill", (0.25 * half, 0.3 * thick), 8)
         add_key(phone, "body", "button_0", face, (0.6 * half, 0.0), outline, 0.0013, 0.0004)
-    _side_keys(rng, phone, "body", half, 0.5 * thick, (0.0, length), thick)
+    _side_keys(rng, phone, half, 0.5 * thick, (0.0, length), thick)
     _stand(rng, phone, half, thick + 0.0045, length)
 
 

@@ -16,30 +16,13 @@ GAP = 0.003
 
 
 def add_case(
-    rng: Rng,
-    table: Assembly,
-    low: Vector,
-    high: Vector,
-    style: Style,
-    grid: tuple[int, int],
-    doors: float,
-    back: bool = False,
-    free: tuple[bool, bool] = (False, False),
-) -> None:
-    """A case, open towards -X, with a grid of cells.
+    rng: Rng, table: Assembly, low: Vector, high: Vector, style: Style, grid: tuple[int, int], doors: float,
+    back: bool = False, free: tuple[bool, bool] = (False, False),
+) -> None:  # fmt: skip
+    """A case between two corners, open towards -X, with a grid of cells, so many columns and rows.
 
-    Parameters
-    ----------
-    low, high : (3,) float
-        Outer corners.
-    grid : 2 int
-        Columns and rows.
-    doors : float
-        How likely a cell that is high enough has doors.
-    back : bool
-        Turns it to open towards +X, reflected in the plane x = 0.
-    free : 2 bool
-        Whether nothing stands beside it at -Y and +Y, so that doors there open beyond a right angle.
+    ``doors`` is how likely a cell that is high enough has doors. Where ``back``, it opens towards +X, reflected in the
+    plane x = 0. Where nothing stands beside it at -Y or +Y, it is ``free`` there: doors open beyond a right angle.
     """
     board = style.board
     style = replace(style, face=float(low[0]), back=float(high[0]) - 0.008)

@@ -102,13 +102,11 @@ def ribs(radius: float, low: float, high: float, count: int, size: float) -> Sol
     return solid
 
 
-def dome(radius: float, low: float, rise: float, sections: int = 20) -> Solid:
+def dome(radius: float, low: float, rise: float) -> Solid:
     """Round cap of a sphere or flatter, on a level circle."""
     levels = ((0.0, 1.0), (0.4, 0.9), (0.75, 0.64), (0.95, 0.3), (1.0, 0.08))
-    discs = [
-        rod(0, 0, (low + h * rise, low + h * rise + 1e-5), max(s * radius, 1e-4), sections=sections) for h, s in levels
-    ]
-    return hull_of(*discs)
+    heights = ((low + h * rise, s * radius) for h, s in levels)
+    return hull_of(*(rod(0, 0, (z, z + 1e-5), max(r, 1e-4), sections=20) for z, r in heights))
 
 
 def pump_head(rng: Rng, low: float, stem: float, size: float, reach: float, down: float) -> Solid:

@@ -7,8 +7,6 @@ feet, plinth, worktop.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin
@@ -22,29 +20,24 @@ from artsim.model.kinematics import Array
 GAP = 0.002
 
 
-@dataclass(frozen=True)
 class Shape:
     """Measures of the cabinet in metres; its front is the plane x = 0."""
 
-    half: float
-    depth: float
-    low: float
-    high: float
+    def __init__(self, rng: Rng) -> None:
+        self.low = rng.uniform(0.012, 0.03)
+        self.front_loader = rng.random() < 0.7
+        self.half = 0.5 * rng.uniform(0.56, 0.7)
+        self.depth = rng.uniform(0.45, 0.66) if self.front_loader else rng.uniform(0.55, 0.7)
+        self.high = self.low + (rng.uniform(0.8, 0.95) if self.front_loader else rng.uniform(0.85, 0.98))
+        if not self.front_loader and rng.random() < 0.35:  # narrow and tall ones, for small rooms
+            self.half, self.depth = 0.5 * rng.uniform(0.4, 0.56), rng.uniform(0.42, 0.6)
+            self.high = self.low + rng.uniform(0.85, 1.15)
 
 
 def build(rng: Rng) -> Assembly:
     """A washing machine, closed at rest."""
-    low = rng.uniform(0.012, 0.03)
-    front_loader = rng.random() < 0.7
-    shape = Shape(
-        half=0.5 * rng.uniform(0.56, 0.7),
-        depth=rng.uniform(0.45, 0.66) if front_loader else rng.uniform(0.55, 0.7),
-        low=low,
-        high=low + (rng.uniform(0.8, 0.95) if front_loader else rng.uniform(0.85, 0.98)),
-    )
-    if not front_loader and rng.random() < 0.35:  # narrow and tall ones, for small rooms
-        shape = Shape(0.5 * rng.uniform(0.4, 0.56), rng.uniform(0.42, 0.6), low, low + rng.uniform(0.85, 1.15))
-    return _front_loader(rng, shape) if front_loader else _top_loader(rng, shape)
+    shape = Shape(rng)
+    return _front_loader(rng, shape) if shape.front_loader else _top_loader(rng, shape)
 
 
 def _feet(s: Shape) -> Solid:
