@@ -14,9 +14,5 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_gallery", "write_contact_sheet", "write_overview"]
 
-_HOMES = {
-    "write_contact_sheet": "contact_sheet",
-    "draw_gallery": "gallery",
-    "write_overview": "scene_overview",
-}
+_HOMES = {"write_contact_sheet": "contact_sheet", "draw_gallery": "gallery", "write_overview": "scene_overview"}
 __getattr__, __dir__ = lazy_names(__name__, _HOMES)

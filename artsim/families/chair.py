@@ -142,8 +142,7 @@ def _castors(rng: Rng, chair: Assembly, legs: int, span: float, floor: float, wh
         x, y = span * cos(angle), span * sin(angle)
         fork = rod(0, 0, (floor - 0.018, floor + 0.004 - GAP), 0.011, sections=14)
         fork += hull_of(
-            box(0.009, gap, (floor - 0.02, floor - 0.01)),
-            rod(trail, (-gap, gap), wheel, 0.5 * wheel, sections=14),
+            box(0.009, gap, (floor - 0.02, floor - 0.01)), rod(trail, (-gap, gap), wheel, 0.5 * wheel, sections=14)
         )
         wheels = Solid()
         clear = GAP if rolling else -0.001

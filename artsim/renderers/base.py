@@ -49,11 +49,7 @@ class CameraBatch(Protocol):
     """What a renderer has besides, if it draws several views at once faster than one after another."""
 
     def render_cameras(
-        self,
-        obj: ArticulatedObject,
-        q: ArrayLike,
-        cameras: Sequence[Camera],
-        T_world_object: ArrayLike | None = None,
+        self, obj: ArticulatedObject, q: ArrayLike, cameras: Sequence[Camera], T_world_object: ArrayLike | None = None
     ) -> list[Frame]:
         """Render one posed object by at least one camera, all of one image size.
 

@@ -87,11 +87,7 @@ class WarpRenderer:
         return self.render_cameras(obj, q, [camera], T_world_object)[0]
 
     def render_cameras(
-        self,
-        obj: ArticulatedObject,
-        q: ArrayLike,
-        cameras: Sequence[Camera],
-        T_world_object: ArrayLike | None = None,
+        self, obj: ArticulatedObject, q: ArrayLike, cameras: Sequence[Camera], T_world_object: ArrayLike | None = None
     ) -> list[Frame]:
         """Render one posed object by several cameras; see :class:`artsim.renderers.base.CameraBatch`."""
         if obj not in self._single:

@@ -40,9 +40,7 @@ ROBOTS = {
     FLOATING: Start((0.0, 0.0, 0.0, 0.0, np.pi / 2, 0.0, 0.04, 0.04)),
     # x, y and heading; torso; head, shoulder, head, shoulder; upper arm, elbow, forearm, wrist, wrist: the hand level.
     "fetch": Start(
-        (0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, -1.0, 0.0, 2.2, 0.0, -1.2, 0.0, 0.04, 0.04),
-        reach=0.8,
-        room=(0.3, 0.3, 1.3),
+        (0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, -1.0, 0.0, 2.2, 0.0, -1.2, 0.0, 0.04, 0.04), reach=0.8, room=(0.3, 0.3, 1.3)
     ),
     # The hand level; all six joints of its hand at 0 hold it open.
     "xarm6_robotiq": Start((0.0, -0.3, -1.0, 0.0, -0.27, *[0.0] * 7), fingers=6, reach=0.58),
