@@ -6,7 +6,8 @@ the outer side of a body open beyond a right angle. So cells never collide with 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from artsim.making.solids import Solid, box, cylinder, hull_of, tray
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
+T = TypeVar("T")
 Moving = tuple[str, Solid, JointSpec]
 """Label, solid and joint of a moving part; its parent is "body"."""
 HINGES = {"left": (1, 1, (0, 0, -1)), "right": (1, -1, (0, 0, 1)), "top": (2, 1, (0, 1, 0)),
@@ -41,50 +43,34 @@ class Cell:
     def between(self, axis: int, first: float, last: float) -> Cell:
         """The part of the opening between two positions along ``axis`` (0: Y, 1: Z)."""
 
-        def changed(pair: tuple[float, float], value: float) -> tuple[float, float]:
+        def changed(pair: tuple[T, T], value: T) -> tuple[T, T]:
             return (value, pair[1]) if axis == 0 else (pair[0], value)
 
-        def inner(pair: tuple[bool, bool], moved: bool) -> tuple[bool, bool]:
-            return (pair[0] and not (moved and axis == 0), pair[1] and not (moved and axis == 1))
-
-        return replace(
-            self,
-            low=changed(self.low, first),
-            high=changed(self.high, last),
-            outer_low=inner(self.outer_low, first > self.low[axis]),
-            outer_high=inner(self.outer_high, last < self.high[axis]),
-        )
+        outer_low = changed(self.outer_low, self.outer_low[axis] and first <= self.low[axis])
+        outer_high = changed(self.outer_high, self.outer_high[axis] and last >= self.high[axis])
+        return Cell(changed(self.low, first), changed(self.high, last), outer_low, outer_high)
 
 
 @dataclass(frozen=True)
 class Style:
     """What all fronts of one piece of furniture share; metres."""
 
-    face: float
-    """X of the front edges of the boards."""
-    back: float
-    """X of the front of the back board."""
+    face: float  # x of the front edges of the boards
+    back: float  # x of the front of the back board
     board: float
-    thickness: float
-    """Of doors and drawer fronts."""
-    overlay: bool
-    """Fronts lie before the boards rather than between them."""
+    thickness: float  # of doors and drawer fronts
+    overlay: bool  # fronts lie before the boards rather than between them
     panel: str
     rail: float
     recess: float
     handle: str
     handle_length: float
     reach: float
-    grip: float
-    """Radius of the handles' bars."""
-    travel: float
-    """Of drawers, as a share of their depth."""
-    lap: float
-    """How far overlaid fronts reach over the boards; they meet over a board that is narrower."""
-    place: float
-    """Where the handles of doors are, as a share of the doors' height."""
-    level: bool
-    """Handles of doors lie level rather than upright."""
+    grip: float  # radius of the handles' bars
+    travel: float  # of drawers, as a share of their depth
+    lap: float  # how far overlaid fronts reach over the boards; they meet over a board that is narrower
+    place: float  # where the handles of doors are, as a share of the doors' height
+    level: bool  # handles of doors lie level rather than upright
 
 
 def drawer(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
