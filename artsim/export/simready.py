@@ -6,8 +6,8 @@ Below the object's folder, with the object's name::
     simready/NAME/usd/textures/*.png
     simready/NAME/usd/.thumbs/256x256/NAME.usdc.png
 
-``simready-validate --profile Robotics-Prop simready/NAME/usd/NAME.usdc`` checks it. In one file, without the picture, it
-is :func:`write_usdz`.
+``simready-validate --profile Robotics-Prop simready/NAME/usd/NAME.usdc`` checks it. :func:`write_usdz` writes one file
+with everything but the picture.
 """
 
 from __future__ import annotations
