@@ -7,6 +7,7 @@ from artsim.commands.doctor import Doctor
 from artsim.commands.export import Export
 from artsim.commands.generate import Generate
 from artsim.commands.generate_objects import GenerateObjects
+from artsim.commands.grasps import Grasps
 from artsim.commands.inspect import Families, Inspect
 from artsim.commands.record import Record
 from artsim.commands.repair import Merge, Repair, Verify
@@ -16,8 +17,8 @@ from artsim.commands.view import Gallery, View
 from artsim.common.program import run_program
 
 Verb = (
-    Generate | Gallery | Families | GenerateObjects | Export | Vary | Record | Scene | View | Inspect | Verify | Repair
-    | Merge | Convert | Doctor
+    Generate | Gallery | Families | GenerateObjects | Export | Grasps | Vary | Record | Scene | View | Inspect | Verify
+    | Repair | Merge | Convert | Doctor
 )  # fmt: skip
 
 
