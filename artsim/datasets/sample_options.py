@@ -10,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 
-from artsim.common.json_records import from_json_values
 from artsim.common.sharding import Shared
 from artsim.errors import ConfigError, RenderError
 from artsim.model.draws import Scale, StateOptions, ViewOptions, sample_scale, sample_state, sample_view
@@ -53,17 +52,6 @@ class SampleOptions:
             raise ConfigError(f"{self.scale} is not a range of diagonals", "scale", "write LOW HIGH in metres")
         if "rgb" in self.images and self.renderer in ("raycast", "warp"):
             raise ConfigError(f"{self.renderer} makes no rgb", "images", "add --renderer sapien or pybullet")
-
-    @staticmethod
-    def from_dict(data: object) -> SampleOptions:
-        """Inverse of ``dataclasses.asdict`` after a trip through JSON.
-
-        Raises
-        ------
-        ValueError, ConfigError
-            When a value is of another type, or makes no sense.
-        """
-        return from_json_values(SampleOptions, data)
 
 
 def draw_sample(

@@ -22,6 +22,7 @@ GAP = 0.004
 """Metres between any two things."""
 _STEADY = np.deg2rad(2.5)
 """What must be tipped further than this before it falls over stays the way it was made to stand."""
+_TURN = (-0.6, 0.6)  # radians about the vertical for what stands upright; what lies lies any way
 _YIELD = 0.02  # of the height of its centre of mass: how deep a thing may sink in to find its footing
 _LEVEL = 1e-6  # of an object's size: corners that touch the ground together
 _TRIES = 200
@@ -60,7 +61,6 @@ class Arrangement:
         q: Array,
         coats: tuple[Coat, ...],
         rng: np.random.Generator,
-        turn: tuple[float, float] = (-0.6, 0.6),
         upright: bool = False,
     ) -> Thing | None:
         """Put an object down where there is room for it.
@@ -71,9 +71,6 @@ class Arrangement:
         q : (K,) float
         coats : tuple of Coat
         rng : numpy Generator
-        turn : 2 float
-            Range in radians about the vertical for what stands upright, 0 having its front towards -X; what lies lies
-            any way.
         upright : bool
             It is held, and need not stand or lie steadily.
 
@@ -83,8 +80,7 @@ class Arrangement:
             None where no room was found.
         """
         resting = np.eye(3) if upright else resting_rotation(obj)
-        if resting[2, 2] < _UPRIGHT:
-            turn = (-np.pi, np.pi)
+        turn = (-np.pi, np.pi) if resting[2, 2] < _UPRIGHT else _TURN
         at_origin = Thing(obj, q, np.eye(4), coats).vertices
         tall = float(np.ptp(dot(at_origin, resting[2])))
         best, least, found = None, np.inf, 0
