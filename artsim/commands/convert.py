@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
 
+from artsim.commands.having import Workers
 from artsim.commands.printing import print_made, resumable
-from artsim.common.program import cores
 from artsim.formats.base import FormatName
 
 
 @dataclass(frozen=True)
-class Convert:
+class Convert(Workers):
     """Convert a finished dataset to a format that other programs read.
 
     webdataset: tar shards with plain keys. bop: scenes, models of parts, poses, masks, joints. coco: masks of parts.
@@ -36,8 +36,6 @@ class Convert:
     """Convert samples with these indices only."""
     group: int = 256
     """Samples of each tar file (webdataset), or images of each scene (bop)."""
-    workers: int = field(default_factory=cores)
-    """Worker processes; by default one for each core."""
 
     def run(self) -> None:
         from artsim.formats.conversion import convert

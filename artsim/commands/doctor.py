@@ -32,14 +32,10 @@ import importlib.util, pybullet
 pybullet.connect(pybullet.DIRECT)
 pybullet.loadPlugin(importlib.util.find_spec("eglRenderer").origin, "_eglRendererPlugin")
 """  # the only way to learn the device is from what PyBullet prints
-_FIXES = {
+_FIXES = {name: install_command(name) for name in ("pybullet", "warp", "ray")} | {
     "raycast": f"pip install --force-reinstall {RAY_LIBRARY}",
-    "pybullet": install_command("pybullet"),
     "pybullet-egl": f"{install_command('pybullet')}, then scripts/install-system.sh as root",
-    "sapien": f"{install_command('sapien')}, then scripts/install-vulkan.sh as root",
-    "maniskill": f"{install_command('maniskill')}, then scripts/install-vulkan.sh as root",
-    "warp": install_command("warp"),
-    "ray": install_command("ray"),
+    **{name: f"{install_command(name)}, then scripts/install-vulkan.sh as root" for name in ("sapien", "maniskill")},
     "torch": install_command("train"),
 }
 

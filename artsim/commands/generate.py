@@ -9,9 +9,8 @@ from typing import Annotated
 import tyro
 
 from artsim.commands.convert import Convert
-from artsim.commands.having import Having, categories_named
+from artsim.commands.having import Having, Workers, categories_named
 from artsim.commands.printing import print_made, resumable
-from artsim.common.program import cores
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
 from artsim.families.constraints import Constraints
@@ -20,7 +19,7 @@ from artsim.loading.roots import Opened
 
 
 @dataclass(frozen=True)
-class Generate(Opened):
+class Generate(Opened, Workers):
     """Generate a dataset of labelled partial point clouds.
 
     Poses each object in random joint states, looks at it from random viewpoints, and writes clouds with full ground
@@ -48,8 +47,6 @@ class Generate(Opened):
     """Samples in all; every object gets about the same number."""
     seed: int = 0
     """Seed of the dataset; sample i depends on (seed, i) only."""
-    workers: int = field(default_factory=cores)
-    """Worker processes; by default one for each core."""
     ray: str | None = None
     """Use a Ray cluster instead: auto (the one that this machine belongs to), local (starts one), or HOST:PORT. Nodes
     need the same artsim, and no disk in common."""

@@ -8,15 +8,14 @@ from typing import Annotated, Literal
 
 import tyro
 
-from artsim.commands.having import Having, categories_named
+from artsim.commands.having import Having, Workers, categories_named
 from artsim.commands.printing import print_made, resumable
-from artsim.common.program import cores
 from artsim.export.options import ExportOptions
 from artsim.families.constraints import Constraints
 
 
 @dataclass(frozen=True)
-class GenerateObjects:
+class GenerateObjects(Workers):
     """Write procedural objects as files: simulation-ready URDF folders in PartNet-Mobility's style, MJCF, USD.
 
     Every object has a folder <out>/<category>/<seed>, and index.csv lists them all. Stop it at any moment: rerun
@@ -38,8 +37,6 @@ class GenerateObjects:
     """Seed of the first object; object n of a category is artsim.make(category, seed + n)."""
     having: Having = ()
     options: Annotated[ExportOptions, tyro.conf.arg(name="")] = field(default_factory=ExportOptions)
-    workers: int = field(default_factory=cores)
-    """Worker processes; by default one for each core."""
 
     def run(self) -> None:
         from artsim.export.batch import generate_objects

@@ -1,10 +1,13 @@
-"""Options of verbs that make objects: which categories, and what every object has."""
+"""Options of several verbs: which categories, what every object has, and how many processes do the work."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Annotated
 
 import tyro
+
+from artsim.common.program import cores
 
 Having = Annotated[
     tuple[str, ...],
@@ -16,6 +19,14 @@ Having = Annotated[
     ),
 ]
 """Constraints of :func:`artsim.make`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Workers:
+    """Options of verbs that work in several processes."""
+
+    workers: int = field(default_factory=cores)
+    """Worker processes; by default one for each core."""
 
 
 def categories_named(named: tuple[str, ...]) -> tuple[str, ...]:

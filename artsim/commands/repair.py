@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
+from artsim.commands.having import Workers
 from artsim.commands.printing import print_some, resumable
-from artsim.common.program import cores
 from artsim.common.tables import plural
 from artsim.errors import DatasetError
 from artsim.loading.roots import Packages
@@ -17,7 +17,7 @@ from artsim.runs.recipe import check_counts
 
 
 @dataclass(frozen=True)
-class Verify:
+class Verify(Workers):
     """Check a dataset: every checksum, the descriptions, the objects, and the ground truth of every sample.
 
     Nothing is written. Each problem says what to do.
@@ -25,8 +25,6 @@ class Verify:
 
     path: tyro.conf.Positional[Path]
     """Dataset folder."""
-    workers: int = field(default_factory=cores)
-    """Processes that check samples of a large dataset."""
 
     def run(self) -> None:
         from artsim.datasets.problems import repair_command
@@ -41,7 +39,7 @@ class Verify:
 
 
 @dataclass(frozen=True)
-class Repair(Packages):
+class Repair(Packages, Workers):
     """Restore what is damaged or missing of a dataset, to the same bytes, or say why that cannot be.
 
     Shards and objects are regenerated, plan.json and dataset.json restore each other. A dataset
@@ -52,8 +50,6 @@ class Repair(Packages):
     """Dataset folder."""
     objects: tuple[Path, ...] = ()
     """Where objects lie that were loaded from files, if they are not where they were."""
-    workers: int = field(default_factory=cores)
-    """Worker processes; by default one for each core."""
 
     def run(self) -> None:
         from artsim.datasets.repair import repair

@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 
 import tyro
 
+from artsim.commands.having import Workers
 from artsim.commands.printing import print_made, resumable
-from artsim.common.program import cores
 from artsim.scenes.dataset import open_scenes
 from artsim.scenes.generate import SceneRun, generate_scenes
 
@@ -18,7 +18,7 @@ _LISTED = 12
 
 
 @dataclass(frozen=True)
-class Scene:
+class Scene(Workers):
     """Make scenes: several articulated objects on a table or a floor, in colour, with the ground truth of each.
 
     Every view becomes a folder: rgb.png, depth.npy, instance_ids.png, part_ids.png, scene.json, a cloud with its full
@@ -39,8 +39,6 @@ class Scene:
     """Scenes, seeds counting up."""
     seed: int = 0
     """Seed of the first scene: the same seed and options make the same files."""
-    workers: int = field(default_factory=cores)
-    """Worker processes; by default one for each core."""
     shard_size: int = 0
     """Scenes of each tar file; 0 writes a folder for each view."""
     options: Annotated[SceneRun, tyro.conf.arg(name="")] = field(default_factory=SceneRun)

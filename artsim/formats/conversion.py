@@ -153,16 +153,14 @@ def convert(
 
 def _pieces(source: Dataset, to: FormatName, split: str | None, samples: Sequence[int], group: int) -> list[Piece]:
     """All pieces: objects first, then each split in order."""
-    chosen, plan, start = set(samples), source.plan, 0
+    chosen, plan = set(samples), source.plan
     members: dict[str, list[int]] = {name: [] for name in SPLITS}
     shown, seen = set(), set()
-    for shard in source.shards:
-        for position, index in enumerate(plan.indices(shard), start):
-            if split in (None, shard.split) and (not chosen or index in chosen):
-                members[shard.split].append(position)
-                shown.add(plan.object_of(index).key)
-                seen.add(index)
-        start += len(shard)
+    for position, (own, index) in enumerate((s.split, index) for s in source.shards for index in plan.indices(s)):
+        if split in (None, own) and (not chosen or index in chosen):
+            members[own].append(position)
+            shown.add(plan.object_of(index).key)
+            seen.add(index)
     if chosen - seen:
         raise ConfigError(
             f"there is no sample {min(chosen - seen)}" + (f" in split {split}" if split else ""),

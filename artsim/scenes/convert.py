@@ -6,6 +6,7 @@ Each scene is a piece of work; see :mod:`artsim.runs.tasks`.
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, Literal
 
@@ -49,11 +50,8 @@ def convert_scenes(
         Where it is.
     """
     source, out = SceneDataset(folder), out or Path(f"{folder}_{to}")
-    first, following = dict[int, int](), 1
-    for entry in source.entries:
-        if entry.scene not in first:  # number of the scene's first model
-            first[entry.scene] = following
-            following += sum(obj.parts for obj in entry.objects)
+    parts = {entry.scene: sum(obj.parts for obj in entry.objects) for entry in source.entries}
+    first = dict(zip(parts, accumulate(parts.values(), initial=1), strict=False))  # number of a scene's first model
     work = {"coco": write_coco, "bop": write_bop}[to]
     tasks = {f"{scene:06d}": Task(work, (folder.absolute(), run, scene, start)) for scene, start in first.items()}
 

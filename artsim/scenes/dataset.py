@@ -90,8 +90,7 @@ class SceneRecord:
             depth = parse_npy(self._read("depth.npy"))
         except ValueError as error:
             raise self._damage(f"depth.npy: {error}") from error
-        if depth.shape != (self.camera.height, self.camera.width) or depth.dtype != np.float32:
-            raise self._damage(f"depth.npy is {depth.dtype} of shape {depth.shape}")
+        self._check("depth.npy", depth, np.float32)
         return depth
 
     @cached_property
@@ -106,11 +105,8 @@ class SceneRecord:
     def camera(self) -> Camera:
         try:
             own = orjson.loads(self._read("scene.json"))["camera"]
-            size = (
-                as_type(Pixels, own["width"], "width"),
-                as_type(Pixels, own["height"], "height"),
-            )
-            return Camera(np.array(own["K"], np.float64), *size, np.array(own["T_world_camera"], np.float64))
+            width, height = (as_type(Pixels, own[name], name) for name in ("width", "height"))
+            return Camera(np.array(own["K"], np.float64), width, height, np.array(own["T_world_camera"], np.float64))
         except (ValueError, KeyError, TypeError) as error:
             raise self._damage(f"scene.json: {error}") from error
 
@@ -127,9 +123,13 @@ class SceneRecord:
 
     def _image(self, name: str) -> NDArray[np.uint8]:
         image = np.asarray(open_image(self._read(name), name, DatasetError, MAX_PIXELS))
-        if image.shape[:2] != (self.camera.height, self.camera.width) or image.dtype != np.uint8:
-            raise self._damage(f"{name} is {image.dtype} of shape {image.shape}")
+        self._check(name, image, np.uint8)
         return image
+
+    def _check(self, name: str, image: NDArray[Any], kind: type) -> None:
+        shape = (self.camera.height, self.camera.width, *((3,) if name == "rgb.png" else ()))
+        if image.shape != shape or image.dtype != kind:
+            raise self._damage(f"{name} is {image.dtype} of shape {image.shape}")
 
     def _read(self, name: str) -> bytes:
         return self._dataset.read_member(self.entry, name)
