@@ -16,7 +16,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.common.array_files import npy_header
+from artsim.common.array_files import npy_header, read_array
 from artsim.common.files import read_bounded
 from artsim.errors import ArtsimError, ConfigError
 
@@ -73,10 +73,8 @@ def read_npy(path: Path, what: str, fix: str) -> Arrays:
     """The array of an ``.npy`` file; never unpickles, and errors as :func:`read_file`."""
 
     def read() -> Arrays:
-        with io.BytesIO(read_file(path, what, 8 * MAX_VALUES + 10_000)) as file:
-            _check_header(file, len(file.getbuffer()), path)
-            file.seek(0)
-            return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
+        data = read_file(path, what, 8 * MAX_VALUES + 10_000)
+        return _array(io.BytesIO(data), len(data), path)
 
     return guard(read, path, what, fix)
 
@@ -146,9 +144,7 @@ class Choice:
         with io.BytesIO(read_file(self.path, self.what)) as file, zipfile.ZipFile(file) as archive:
             member = archive.getinfo(f"{name}.npy")
             with archive.open(member) as stream:
-                _check_header(stream, member.file_size, self.path)  # type: ignore[arg-type]
-            with archive.open(member) as stream:
-                return np.asarray(np.lib.format.read_array(stream, allow_pickle=False))
+                return _array(stream, member.file_size, self.path)  # type: ignore[arg-type]
 
 
 def check_count(values: int, path: Path, what: str) -> None:
@@ -159,17 +155,15 @@ def check_count(values: int, path: Path, what: str) -> None:
         )
 
 
-def _check_header(stream: BinaryIO, size: int, path: Path) -> None:
-    """Refuse an array that would need to be unpickled, that is too large, or that the file does not hold."""
+def _array(stream: BinaryIO, size: int, path: Path) -> Arrays:
+    """An array, unless it has more values than any cloud or image has."""
     shape, _, dtype, _ = npy_header(stream)
     count = math.prod(shape)
-    if dtype.hasobject:
-        raise ConfigError("it holds Python objects, which are never unpickled", path, "save an array of numbers")
     check_count(count * max(1, len(dtype.names or ())), path, "an array")
-    if count * dtype.itemsize > size:
-        raise ConfigError(f"it is cut off: it does not hold its {shape} values", path, "copy or save it again")
     if count * dtype.itemsize > 8 * MAX_VALUES:
         raise ConfigError("it is too large", path, "save fewer points, or fewer columns")
+    stream.seek(0)
+    return read_array(stream, size)
 
 
 def _check_directory(file: BinaryIO, path: Path) -> None:

@@ -184,7 +184,8 @@ def _content(path: Path) -> Any:
         return _arrays(path)
     data = read_file(path, "intrinsics", _MAX_BYTES)
     if ending == ".txt" and not data.lstrip().startswith(b"{"):
-        return _numbers(data, path)
+        text = re.sub(r"#.*", "", data[:10_000].decode("latin-1"))
+        return [float(word) for word in re.split(r"[\s,;\[\]]+", text.strip(" \t\r\n,;[]"))]
     return parse_json(data.removeprefix(b"\xef\xbb\xbf"))
 
 
@@ -199,16 +200,6 @@ def _arrays(path: Path) -> dict[str, Any]:
         ("k", "cam_k", "intrinsics", "intrinsic", "intrinsic_matrix", "camera_matrix", "cameramatrix", "mtx")
     )
     return {n: value for n, value in values.items() if n != name} | {"camera_matrix": matrix.tolist()}
-
-
-def _numbers(data: bytes, path: Path) -> Array:
-    text = re.sub(r"#.*", "", data[:10_000].decode("latin-1"))
-    words = re.split(r"[\s,;\[\]]+", text.strip(" \t\r\n,;[]"))
-    values = np.array([float(word) for word in words])
-    shape = {9: (3, 3), 12: (3, 4), 16: (4, 4)}.get(len(values))
-    if shape is None:
-        raise ConfigError(f"{len(values)} numbers are no intrinsic matrix", path, "write 3 rows of 3 numbers")
-    return values.reshape(shape)
 
 
 def _yaml(data: bytes, path: Path) -> Any:

@@ -74,18 +74,15 @@ def read_mask(path: Path, mask_id: str | None = None, kind: MaskKind = "auto") -
     if ending in (".npy", ".npz"):
         return _of_array(_read_array(path), path, mask_id, kind)
     picture = read_picture(path, "mask")
-    values = picture.values
+    if picture.mode == "CMYK":
+        raise ConfigError("a mask in CMYK is not read", path, _FIX)
     if picture.format in _LOSSY:
         return _of_lossy(picture, path, mask_id)
     if picture.mode == "P":
         return _of_palette(picture, path, mask_id)
-    if picture.mode == "CMYK":
-        raise ConfigError("a mask in CMYK is not read", path, _FIX)
-    if values.ndim == 3 and values.shape[2] == 2:
-        return _with_alpha(values[..., :1], values[..., 1], path, mask_id, kind)
-    if values.ndim == 3 and values.shape[2] == 4:
-        return _with_alpha(values[..., :3], values[..., 3], path, mask_id, kind)
-    return _of_array(values, path, mask_id, kind)
+    if picture.values.ndim == 3 and picture.values.shape[2] == 2:
+        return _with_alpha(picture.values, path, mask_id, kind)
+    return _of_array(picture.values, path, mask_id, kind)
 
 
 def _read_array(path: Path) -> NDArray[Any]:
@@ -100,16 +97,14 @@ def _of_array(values: NDArray[Any], path: Path, mask_id: str | None, kind: MaskK
         values = values[0]
     if values.dtype.kind not in "bfiu" or values.size == 0 or values.ndim not in (2, 3):
         raise ConfigError(f"an array of shape {values.shape} and type {values.dtype} is no mask", path, _FIX)
+    if values.ndim == 3 and 1 in (values.shape[0], values.shape[2]):
+        values = values[..., 0] if values.shape[2] == 1 else values[0]
     if values.ndim == 2:
         return _of_numbers(values, path, mask_id, kind)
-    if values.shape[2] == 1:
-        return _of_numbers(values[..., 0], path, mask_id, kind)
-    if values.shape[0] == 1:
-        return _of_numbers(values[0], path, mask_id, kind)
     if values.shape[2] == 3:
         return _of_colours(values, path, mask_id, kind)
     if values.shape[2] == 4:
-        return _with_alpha(values[..., :3], values[..., 3], path, mask_id, kind)
+        return _with_alpha(values, path, mask_id, kind)
     if mask_id is None or not mask_id.isdigit() or int(mask_id) >= len(values):
         raise ConfigError(
             f"it is a stack of {len(values)} masks", path, f"choose one: --mask-id 0 to {len(values) - 1}"
@@ -219,8 +214,9 @@ def _of_colours(values: NDArray[Any], path: Path, mask_id: str | None, kind: Mas
     return Mask(shown, (), (f"{text} Fix: add --mask-id with one of them",) if several and kind == "auto" else ())
 
 
-def _with_alpha(colour: NDArray[Any], alpha: NDArray[Any], path: Path, mask_id: str | None, kind: MaskKind) -> Mask:
+def _with_alpha(values: NDArray[Any], path: Path, mask_id: str | None, kind: MaskKind) -> Mask:
     """Alpha is no colour: what is black is not the object. But what is transparent is not there either."""
+    colour, alpha = values[..., :-1], values[..., -1]
     soft = _soft(alpha, np.unique(alpha)) if kind == "auto" else None
     opaque = alpha != 0 if soft is None else soft.shown
     if mask_id is None and not (colour != 0).any() and not opaque.all():
@@ -269,8 +265,6 @@ def _of_lossy(picture: Picture, path: Path, mask_id: str | None) -> Mask:
     values = picture.values.astype(np.float64)
     weights = {1: [1.0], 3: [0.299, 0.587, 0.114], 4: [0.299, 0.587, 0.114, 0.0]}  # ITU-R BT.601; alpha is no colour
     light = values if values.ndim == 2 else values @ np.array(weights.get(values.shape[2], [0.0] * values.shape[2]))
-    if picture.mode == "CMYK":
-        raise ConfigError("a mask in CMYK is not read", path, _FIX)
     return Mask(light > 127, (f"a {picture.format} mask: the object is what is lighter than 127 of 255",))
 
 

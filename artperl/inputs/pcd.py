@@ -58,29 +58,25 @@ def _read(path: Path) -> tuple[Array, tuple[str, ...]]:
             raise _cut_off(points, path)
         return cloud, notes
     widths = [size * count for size, count in zip(sizes, counts, strict=True)]
-    types = [np.dtype(f"<{kinds[column]}{sizes[column]}") for column in columns]
+    places = [sum(widths[:column]) for column in columns]
+    types = [f"<{kinds[column]}{sizes[column]}" for column in columns]
+    size = points * sum(widths)
     if kind == "binary":
-        if start + points * sum(widths) > len(data):
+        if start + size > len(data):
             raise _cut_off(points, path)
-        rows = np.frombuffer(data, np.uint8, points * sum(widths), start).reshape(points, sum(widths))
-        places = [sum(widths[:column]) for column in columns]
-        fields = [
-            np.ascontiguousarray(rows[:, at : at + t.itemsize]).view(t)[:, 0]
-            for at, t in zip(places, types, strict=True)
-        ]
+        row = np.dtype({"names": ["x", "y", "z"], "formats": types, "offsets": places, "itemsize": sum(widths)})
+        rows = np.frombuffer(data, row, points, start)
+        fields = [rows[axis] for axis in "xyz"]
     else:
         packed, whole = (int.from_bytes(data[start + at : start + at + 4], "little") for at in (0, 4))
-        if whole != points * sum(widths) or start + 8 + packed > len(data):
+        if whole != size or start + 8 + packed > len(data):
             raise _cut_off(points, path)
         if whole > 8 * MAX_VALUES:
             raise ConfigError("it is too large", path, "save fewer points, or fewer fields")
         raw = unpack_lzf(data[start + 8 : start + 8 + packed], whole)
-        places = [points * sum(widths[:column]) for column in columns]  # field by field here, not point by point
-        fields = [np.frombuffer(raw, t, points, at) for at, t in zip(places, types, strict=True)]
-    cloud = np.empty((points, 3))
-    for n, values in enumerate(fields):
-        cloud[:, n] = values
-    return cloud, notes
+        # Field by field here, not point by point.
+        fields = [np.frombuffer(raw, of, points, points * at) for of, at in zip(types, places, strict=True)]
+    return np.stack(fields, axis=1, dtype=np.float64, casting="unsafe"), notes
 
 
 def unpack_lzf(packed: bytes, size: int) -> bytes:

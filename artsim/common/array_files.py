@@ -80,7 +80,7 @@ def parse_npz(data: bytes, max_bytes: int = MAX_ARRAY_BYTES) -> dict[str, NDArra
                 if left < 0:
                     raise ValueError("it expands to more than the limit")
                 with archive.open(member) as stream:
-                    arrays[name] = _npy(stream, member.file_size)  # type: ignore[arg-type]  # has read()
+                    arrays[name] = read_array(stream, member.file_size)  # type: ignore[arg-type]  # has read()
                     stream.read(1)  # at its end, the checksum is compared
     except Exception as problem:  # zipfile and zlib raise whatever they stumble on in bytes that are not theirs
         raise ValueError(str(problem) or type(problem).__name__) from problem
@@ -112,7 +112,7 @@ def parse_npy(data: bytes) -> NDArray[Any]:
     ValueError
         When they are damaged or hold Python objects.
     """
-    return _npy(io.BytesIO(data), len(data))
+    return read_array(io.BytesIO(data), len(data))
 
 
 def npy_header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
@@ -156,8 +156,11 @@ def _header_fields(text: bytes, offset: int) -> tuple[tuple[int, ...], bool, np.
     return tuple(int(side) for side in shape), fortran, dtype
 
 
-def _npy(stream: BinaryIO, size: int) -> NDArray[Any]:
-    """One array in NumPy's format out of ``size`` bytes: its header is compared with them before memory is taken."""
+def read_array(stream: BinaryIO, size: int) -> NDArray[Any]:
+    """One array in NumPy's format out of ``size`` bytes: its header is compared with them before memory is taken.
+
+    Raises ValueError as :func:`parse_npy`.
+    """
     shape, fortran, dtype, offset = npy_header(stream)
     if dtype.hasobject:
         raise ValueError("it holds Python objects, which are never read")

@@ -133,9 +133,11 @@ class _Scene:
             return
         if node.tag == "node":
             for element in node:
-                make = _TRANSFORMS.get(element.tag)
-                if make is not None:
-                    T = compose_affine(T, make(element, node))
+                if element.tag == "skew":
+                    raise UnusableMeshError(f"node {quote_name(attribute(node))} has a <skew>, which is not read")
+                if element.tag in _TRANSFORMS:
+                    count, make = _TRANSFORMS[element.tag]
+                    T = compose_affine(T, make(values(element, count, node)))
         for geometry in self._shown_by(node):
             faces = geometry.faces[:, ::-1] if mirrors(T) else geometry.faces
             self._draft.accounted += len(faces)
@@ -208,21 +210,9 @@ class _Scene:
                 self._draft.note(f"geometry {quote_name(attribute(geometry))} is not in the scene: left out")
 
 
-def _matrix(element: etree._Element, node: etree._Element) -> Array:
-    return values(element, 16, node).reshape(4, 4)
-
-
-def _translation(element: etree._Element, node: etree._Element) -> Array:
-    return compose_transform(values(element, 3, node))
-
-
-def _scaling(element: etree._Element, node: etree._Element) -> Array:
-    return np.diag([*values(element, 3, node), 1.0])
-
-
-def _rotation(element: etree._Element, node: etree._Element) -> Array:
+def _rotation(found: Array) -> Array:
     """About an axis, by degrees."""
-    x, y, z, degrees = values(element, 4, node).tolist()
+    x, y, z, degrees = found.tolist()
     length = math.sqrt(x * x + y * y + z * z)
     if length == 0.0:
         return np.eye(4)
@@ -232,23 +222,23 @@ def _rotation(element: etree._Element, node: etree._Element) -> Array:
     return compose_transform(np.zeros(3), turn)
 
 
-def _look_at(element: etree._Element, node: etree._Element) -> Array:
+def _look_at(found: Array) -> Array:
     """A node that stands at a point and looks along its -z at another."""
-    eye, target, up = values(element, 9, node).reshape(3, 3)
+    eye, target, up = found.reshape(3, 3)
     back = eye - target
     right = np.cross(up, back)
     lengths = [math.sqrt(float((v * v).sum())) for v in (back, right)]
     if min(lengths) == 0.0:
-        raise UnusableMeshError(f"<lookat> of node {quote_name(attribute(node))} has no direction")
+        raise UnusableMeshError("a <lookat> has no direction")
     x, z = right / lengths[1], back / lengths[0]
     return compose_transform(eye, np.column_stack([x, np.cross(z, x), z]))
 
 
-def _skew(element: etree._Element, node: etree._Element) -> Array:
-    raise UnusableMeshError(f"node {quote_name(attribute(node))} has a <skew>, which is not read")
-
-
-_TRANSFORMS: dict[str, Callable[[etree._Element, etree._Element], Array]] = {
-    "matrix": _matrix, "translate": _translation, "scale": _scaling, "rotate": _rotation, "lookat": _look_at,
-    "skew": _skew,
-}  # fmt: skip
+_TRANSFORMS: dict[str, tuple[int, Callable[[Array], Array]]] = {
+    "matrix": (16, lambda found: found.reshape(4, 4)),
+    "translate": (3, compose_transform),
+    "scale": (3, lambda found: np.diag([*found, 1.0])),
+    "rotate": (4, _rotation),
+    "lookat": (9, _look_at),
+}
+"""How many numbers each element has, and the transform that they make."""
