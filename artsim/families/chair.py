@@ -58,8 +58,8 @@ def build(rng: Rng) -> Assembly:
         seat += box((0.2 * depth, hinge[0] - (0.018 if tilting else 0.0)), 0.04, (seat_low + 0.005, seat_low + 0.045))
         if tilting:  # forks either side of the hinge
             for side in (-1, 1):
-                y0, y1 = sorted((side * (0.03 + GAP), side * 0.05))
-                seat += box((0.2 * depth, hinge[0] + 0.012), (y0, y1), (seat_low + 0.005, seat_low + 0.045))
+                beside = side * (0.03 + GAP), side * 0.05
+                seat += box((0.2 * depth, hinge[0] + 0.012), beside, (seat_low + 0.005, seat_low + 0.045))
     arms = str(rng.choice(["none", "fixed", "sliding"], p=[1, 0, 0] if stool else [0.4, 0.4, 0.2]))
     if arms == "fixed":
         seat += _arms(rng, depth, width, seat_low, top)

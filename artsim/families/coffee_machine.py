@@ -87,13 +87,9 @@ def _espresso(rng: Rng) -> Assembly:
     if wand_side:
         foot = np.array([-x + 0.03, wand_side * (y - 0.022), head_low - GAP])
         drop = min(0.13, head_low - base - 0.04)
-        path = [
-            foot,
-            foot - (0, 0, 0.02),
-            foot + (-0.025, 0.01 * wand_side, -0.6 * drop),
-            foot + (-0.03, 0.014 * wand_side, -drop),
-        ]
-        wand = tube(np.array(path), 0.0045, 10) + cylinder(foot, foot - (0, 0, 0.014), 0.009, sections=14)
+        bends = (-0.025, 0.01 * wand_side, -0.6 * drop), (-0.03, 0.014 * wand_side, -drop)
+        wand = tube(foot + np.array([(0, 0, 0), (0, 0, -0.02), *bends]), 0.0045, 10)
+        wand += cylinder(foot, foot - (0, 0, 0.014), 0.009, sections=14)
         turn = revolute("body", (0, 0, -wand_side), tuple(foot), 0.0, np.deg2rad(rng.uniform(60.0, 120.0)))
         machine.add("steam_wand", wand, turn, density=3000.0)
     _controls(rng, machine, -x, y, head_low, height)
@@ -192,13 +188,8 @@ def _percolator(rng: Rng) -> Assembly:
     turn = float(rng.choice([0.5, -0.5, 0.0, 1.0])) * np.pi  # where the handle points
     reach, r = rng.uniform(0.03, 0.06), rng.uniform(0.005, 0.009)
     out = radius + reach
-    grip = [
-        (narrow, 0, low + 0.2 * tall),
-        (out, 0, low + 0.3 * tall),
-        (out, 0, top - 0.03),
-        (radius - 0.002, 0, top - 0.02),
-    ]
-    body += tube(np.array(grip), r, 10).turned((0, 0, 1), turn)
+    grip = [(narrow, 0, low + 0.2 * tall), (out, 0, low + 0.3 * tall), (out, 0, top - 0.03)]
+    body += tube([*grip, (radius - 0.002, 0, top - 0.02)], r, 10).turned((0, 0, 1), turn)
     machine = Assembly("body", body, 900.0)
     seam, rise = top + GAP, rng.uniform(0.006, 0.03)
     lid = rod(0, 0, (seam, seam + rise), radius + 0.003, rng.uniform(0.5, 1.0) * radius)
@@ -262,9 +253,8 @@ def _pod(rng: Rng) -> Assembly:
     length = rng.uniform(0.6, 0.95) * (pivot[0] + x - 0.01)
     lever = box((pivot[0] - length, pivot[0] - length + 0.03), wide, (height + GAP, height + GAP + thick), fillet=0.004)
     for s in (-1.0, 1.0):
-        arm = sorted((s * wide, s * (wide - 0.01)))
-        deep = (pivot[0] - length, pivot[0] + 0.006)
-        lever += box(deep, (arm[0], arm[1]), (height + GAP, height + GAP + thick), fillet=0.004)
+        deep, arm = (pivot[0] - length, pivot[0] + 0.006), (s * wide, s * (wide - 0.01))
+        lever += box(deep, arm, (height + GAP, height + GAP + thick), fillet=0.004)
     lever += rod(pivot[0], (-wide, wide), height + 0.0075, 0.005, sections=12)
     limit = np.deg2rad(rng.uniform(60.0, 105.0))
     turn = revolute("body", (0, 1, 0), (pivot[0], 0, height + 0.0075), 0.0, limit)

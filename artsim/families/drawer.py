@@ -189,8 +189,8 @@ def _table(rng: Rng, furniture: _Furniture) -> None:
             board = box((x1 - inset - wall, x1 - inset), between, (top - apron, top + 0.001))
             furniture.body += board if back else board.mirrored(0)
     for side in (-1, 1):
-        beside = sorted((side * (y - inset), side * (y - inset - wall)))
-        furniture.body += box((x0 + leg - 0.002, x1 - leg + 0.002), (beside[0], beside[1]), (top - apron, top + 0.001))
+        beside = side * (y - inset), side * (y - inset - wall)
+        furniture.body += box((x0 + leg - 0.002, x1 - leg + 0.002), beside, (top - apron, top + 0.001))
     if rng.random() < 0.25:  # a shelf between the legs
         z = rng.uniform(0.12, 0.35) * height
         furniture.body += box((x0 + 0.25 * leg, x1 - 0.25 * leg), y - 0.25 * leg, (z, z + 0.018))

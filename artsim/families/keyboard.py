@@ -252,8 +252,8 @@ def _pivot(rng: Rng, keyboard: Assembly, caps: _Caps) -> None:
         # One half's disc lies on the other's, each joined to its own half by an arm.
         low, high = (0.0, 0.45 * thick) if side > 0 else (0.45 * thick + GAP, thick)
         body += rod(pivot[0], 0, (low, high), radius, sections=20)
-        arm = sorted((side * (gap + 0.2 * radius), side * (gap + 1.6 * radius)))
-        body += box((half[1] - 0.003, pivot[0] + 0.3 * radius), (arm[0], arm[1]), (low, high))
+        arm = side * (gap + 0.2 * radius), side * (gap + 1.6 * radius)
+        body += box((half[1] - 0.003, pivot[0] + 0.3 * radius), arm, (low, high))
         bodies.append((body, face))
     keyboard.add("left", bodies[0][0])
     keyboard.add("right", bodies[1][0], revolute("left", (0, 0, 1), (*pivot, thick), 0.0, rng.uniform(0.3, 0.9)))

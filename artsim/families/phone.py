@@ -151,14 +151,13 @@ def _slider(rng: Rng, phone: Assembly) -> None:
     body = _slab(rng, half, (0.0, lower), (0.0, length), 1)
     sideways = rng.random() < 0.3
     travel = (half if sideways else 0.5 * length) * rng.uniform(0.7, 0.95)
+    runner = plane + GAP, 0.001
     if sideways:
-        body += union(
-            box((plane + GAP, 0.001), 0.5 * half, (z, z + 0.03 * length)) for z in (0.02 * length, 0.95 * length)
-        )
+        body += union(box(runner, 0.5 * half, (z, z + 0.03 * length)) for z in (0.02 * length, 0.95 * length))
         keys = (0.12 * length, 0.88 * length)
     else:
-        body += union(box((plane + GAP, y - 0.05 * half, 0.55 * length), (0.001, y + 0.05 * half, 0.95 * length))
-                      for y in (-0.7 * half, 0.7 * half))  # fmt: skip
+        upright = 0.55 * length, 0.95 * length
+        body += union(box(runner, about(s * 0.7 * half, 0.05 * half), upright) for s in (-1, 1))
         keys = (0.06 * length, 0.47 * length)
     phone.add("body", body)
     upper = thick - lower
@@ -200,16 +199,16 @@ def _fold(rng: Rng, phone: Assembly) -> None:
     body = _slab(rng, half, (0.5 * gap, leaf), (0.0, length), 1)
     y = side * (half + radius + GAP)
     first = np.linspace(0.03, 0.97, 6) * length
-    reach = sorted((side * 0.5 * half, y))
+    reach = side * 0.5 * half, y
     for low, high in ((first[0], first[1]), (first[4], first[5])):
         body += rod(0, y, (low, high), radius, sections=16)
-        body += box((0.5 * gap, 0.5 * gap + 0.5 * (leaf - 0.5 * gap)), (reach[0], reach[1]), (low, high))
+        body += box((0.5 * gap, 0.5 * gap + 0.5 * (leaf - 0.5 * gap)), reach, (low, high))
     bump = (leaf - 0.0005, leaf + 0.0016), (-0.6 * half, 0.1 * half), (0.7 * length, 0.95 * length)
     body += box(*bump, fillet=0.3 * half, axis=0, steps=2)
     phone.add("body", body, density=1500.0)
     lid = _slab(rng, half, (-leaf, -0.5 * gap), (0.0, length), -1)
     lid += rod(0, y, (first[1] + GAP, first[4] - GAP), radius, sections=16)
-    lid += box((-0.5 * leaf - 0.25 * gap, -0.5 * gap), (reach[0], reach[1]), (first[1] + GAP, first[4] - GAP))
+    lid += box((-0.5 * leaf - 0.25 * gap, -0.5 * gap), reach, (first[1] + GAP, first[4] - GAP))
     phone.add("lid", lid, revolute("body", (0, 0, -side), (0, y, 0), 0.0, rng.uniform(1.6, 3.1)), density=1500.0)
     _side_keys(rng, phone, half, 0.5 * leaf + 0.25 * gap, (0.0, length), leaf, (-side,))
 
@@ -227,9 +226,8 @@ def _smartphone(rng: Rng, phone: Assembly) -> None:
         body += box((0.5 * thick, thick + bump), about(y, size), about(z, size), fillet=0.5 * size, axis=0, steps=2)
     phone.add("body", body, density=1800.0)
     if chin > 0.1:
-        add_function_keys(
-            rng, phone, "body", front_face(0.0), 0.8 * half, (0.02 * length, (chin - 0.02) * length), 0.0013, 0
-        )
+        z = 0.02 * length, (chin - 0.02) * length
+        add_function_keys(rng, phone, "body", front_face(0.0), 0.8 * half, z, 0.0013, 0)
     else:
         face = Face(np.array([0.5 * thick, 0.0, length]), np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0]))
         outline = key_outline("pill", (0.25 * half, 0.3 * thick), 8)
@@ -241,8 +239,7 @@ def _smartphone(rng: Rng, phone: Assembly) -> None:
 def _cordless(rng: Rng, phone: Assembly) -> None:
     """A handset that stands in a dock, and is drawn out upwards."""
     length, half, thick = _size(rng)
-    length = 1.1 * length
-    thick = max(thick, 0.016)
+    length, thick = 1.1 * length, max(thick, 0.016)
     floor, rise = 0.004 + 0.2 * thick, length * rng.uniform(0.12, 0.3)
     room = 0.0015
     size = np.array([2.0 * half * rng.uniform(1.3, 2.6), thick * rng.uniform(2.2, 5.0)])
@@ -256,8 +253,7 @@ def _cordless(rng: Rng, phone: Assembly) -> None:
             across = opening[1] if axis == 0 else 0.5 * size[1]
             foot = np.array([(a, b) for a in (near, far) for b in (-across, across)])
             crown = np.array([(a, b) for a in (near, near + taper * 0.5 * (far - near)) for b in (-across, across)])
-            points = [lifted(ring_, z) for ring_, z in ((foot, floor - 1e-4), (crown, floor + rise))]
-            flat = np.concatenate(points)
+            flat = np.concatenate([lifted(foot, floor - 1e-4), lifted(crown, floor + rise)])
             dock += hull(flat if axis == 0 else flat[:, [1, 0, 2]])
     phone.add("dock", dock, density=900.0)
     start = floor + GAP

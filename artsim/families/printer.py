@@ -132,16 +132,15 @@ def _fill(
     front, high = -case.x, low + band.height
     wide = half - GAP
     thick = min(rng.uniform(0.006, 0.014), 0.3 * band.height)
+    solid = box((front, front + thick), wide, (low + GAP, high - GAP), fillet=0.03 * wide, axis=0, steps=2)
     if band.kind == "drawer":
         depth = cavity - 2.0 * GAP
-        solid = box((front, front + thick), wide, (low + GAP, high - GAP), fillet=0.03 * wide, axis=0, steps=2)
         rise = (high - low) * rng.uniform(0.5, 0.85)
         solid += tray((front + 0.5 * thick, -0.96 * wide, low + GAP), (front + depth, 0.96 * wide, low + rise), 0.003)
         solid += _pull(rng, front, 0.35 * wide, low + GAP, high - GAP)
         slide = prismatic("body", FRONT, 0.0, depth * rng.uniform(0.6, 0.9), (front, 0, low))
         printer.add(f"drawer_{number}", solid, slide, density=700.0)
     elif band.kind == "flap":
-        solid = box((front, front + thick), wide, (low + GAP, high - GAP), fillet=0.03 * wide, axis=0, steps=2)
         if rng.random() < 0.6:
             solid += box((front - 0.006, front + 0.5 * thick), 0.15 * wide, (high - GAP - 0.012, high - GAP - 0.004))
         if rng.random() < 0.4:  # guides for paper on its inner side
@@ -155,11 +154,9 @@ def _fill(
         z = low + GAP
         solid = box((front, front + depth), 0.9 * wide, (z, z + 0.004))
         solid += box((front, front + 0.005), 0.9 * wide, (z, z + min(0.3 * band.height, 0.014)))
-        printer.add(
-            f"tray_{number}", solid, prismatic("body", FRONT, 0.0, 0.85 * depth, (front, 0, low)), density=900.0
-        )
+        slide = prismatic("body", FRONT, 0.0, 0.85 * depth, (front, 0, low))
+        printer.add(f"tray_{number}", solid, slide, density=900.0)
     elif band.kind == "tilting panel":
-        solid = box((front, front + thick), wide, (low + GAP, high - GAP), fillet=0.03 * wide, axis=0, steps=2)
         hinge = revolute("body", (0, 1, 0), (front, 0, high - GAP), 0.0, rng.uniform(0.4, 1.2))
         name = printer.add(f"panel_{number}", solid, hinge, density=900.0)
         _keys(rng, printer, name, front, wide, low + GAP, high - GAP)

@@ -108,9 +108,9 @@ def four_legs(rng: Rng, x: float, y: float, low: float, high: float, size: float
     solid = Solid()
     if kind == "loops":
         for s in (-1, 1):
-            a, b = sorted((s * y, s * (y - size)))
-            solid += union(box((u, u + size), (a, b), (low, high)) for u in (-x, x - size))
-            solid += box(x, (a, b), (low, low + 0.7 * size))
+            beside = s * y, s * (y - size)
+            solid += union(box((u, u + size), beside, (low, high)) for u in (-x, x - size))
+            solid += box(x, beside, (low, low + 0.7 * size))
         return solid
     for sx in (-1, 1):
         for sy in (-1, 1):

@@ -62,8 +62,8 @@ def _plug(plug: _Plug, x: float, sign: float = -1.0) -> Solid:
     first, last = sorted((x - sign * 0.002, x + sign * plug.reach))
     outer, hole = np.array([plug.half, plug.thick]), np.array([plug.half - wall, plug.thick - wall])
     solid = sleeve((first, *-outer), (last, *outer), -hole, hole, 0.2 * plug.thick, 1)
-    first, last = sorted((x - sign * 0.002, x + sign * 0.93 * plug.reach))
-    return solid + box((first, last), plug.half - 0.5 * wall, (-0.05 * plug.thick, 0.5 * plug.thick))
+    tongue = x - sign * 0.002, x + sign * 0.93 * plug.reach
+    return solid + box(tongue, plug.half - 0.5 * wall, (-0.05 * plug.thick, 0.5 * plug.thick))
 
 
 def _outline(kind: str, x0: float, x1: float, half: float, rng: Rng) -> list[Array]:
