@@ -200,15 +200,12 @@ def _octagon(a: float, b: float) -> Array:
 def _bridge(rng: Rng, style: str, outline: Array, front: Front, rim: float) -> Solid:
     """One bar, two, or a thick saddle between the rims."""
     low, high = outline[:, 1].min(), outline[:, 1].max()
-    inner = outline[: len(outline)]
     thick = style == "thick"
     radius = 0.5 * max(rim, 1.8 * MM) if not thick else 0.5 * rng.uniform(3.0, 6.0) * MM
 
     def bar(level: float, arch: float) -> Solid:
         z = low + level * (high - low)
-        left = inner[inner[:, 0] < np.median(inner[:, 0])]
-        left = left[np.argsort(left[:, 1], kind="stable")]
-        y = float(np.interp(z, *left.T[::-1])) + (3.0 if style == "rimless" else 0.3) * MM
+        y = _edge(outline, z, False) + (3.0 if style == "rimless" else 0.3) * MM
         share = np.linspace(-1.0, 1.0, 7)
         bow = arch * (1 - np.square(share))
         return tube(np.column_stack([front.x(share * y) - 0.4 * bow, share * y, z + bow]), radius, 8)
@@ -224,8 +221,7 @@ def _nose_pads(rng: Rng, style: str, outline: Array, front: Front, rim: float) -
     """Two pads that slope along the nose, on wires or grown to the rims."""
     low, high = outline[:, 1].min(), outline[:, 1].max()
     z = low + rng.uniform(0.38, 0.55) * (high - low)
-    left = outline[outline[:, 0] < np.median(outline[:, 0])]
-    edge = float(np.interp(z, *left[np.argsort(left[:, 1], kind="stable")].T[::-1]))
+    edge = _edge(outline, z, False)
     x = float(front.x(edge))
     if style == "shield":
         return Solid()
@@ -242,17 +238,18 @@ def _nose_pads(rng: Rng, style: str, outline: Array, front: Front, rim: float) -
     return pad + wire + (pad + wire).mirrored(1)
 
 
-def _outer_edge(outline: Array, z: float) -> float:
-    """y of the outline's outer side at a height."""
-    right = outline[outline[:, 0] > np.median(outline[:, 0])]
-    right = right[np.argsort(right[:, 1], kind="stable")]
-    return float(np.interp(z, right[:, 1], right[:, 0]))
+def _edge(outline: Array, z: float, outer: bool) -> float:
+    """y of the outline's outer or inner side at a height."""
+    y, middle = outline[:, 0], np.median(outline[:, 0])
+    side = outline[y > middle if outer else y < middle]
+    side = side[np.argsort(side[:, 1], kind="stable")]
+    return float(np.interp(z, side[:, 1], side[:, 0]))
 
 
 def _endpiece(front: Front, outline: Array, depth: float, side: int) -> Solid:
     """Corner from the lens or rim out and back to the hinge."""
     h, z = 0.5 * front.height, front.hinge_z
-    y = _outer_edge(outline, z)
+    y = _edge(outline, z, True)
     x = float(front.x(front.half))
     near, far = front.half + front.barrel, front.half + front.barrel + front.thickness
     x_lens = float(front.x(y))
@@ -266,7 +263,7 @@ def _endpiece(front: Front, outline: Array, depth: float, side: int) -> Solid:
 
 def _plate_corner(front: Front, outline: Array, depth: float, side: int) -> Solid:
     """Corner of a frame that is a plate, from the lens out to the hinge within the plate."""
-    across = (_outer_edge(outline, front.hinge_z) - 1.2 * MM, front.half + front.thickness)
+    across = (_edge(outline, front.hinge_z, True) - 1.2 * MM, front.half + front.thickness)
     solid = box((-depth - GAP, -GAP), across, about(front.hinge_z, 0.5 * front.height))
     return solid if side > 0 else solid.mirrored(1)
 

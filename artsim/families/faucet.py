@@ -84,11 +84,7 @@ def _kitchen_mixer(rng: Rng) -> Assembly:
     spout = _gooseneck(rng, np.array([0.0, 0.0, top]), r, reach, tip)
     tap = Assembly("base", body, BRASS)
     pivot = np.array([0.0, side * stem, level])
-    if rng.random() < 0.75:
-        joint = swivel("base", UP, (0, 0, top), None if rng.random() < 0.5 else rng.uniform(0.9, 2.6))
-        tap.add("spout", spout, joint)
-    else:
-        tap.body += spout.moved((0, 0, -GAP - 0.001))
+    _add_spout(rng, tap, spout, top, 0.75, 0.5)
     start = UP if rng.random() < 0.6 else FRONT
     handle = _handle(rng, pivot, out, start, hub * rng.uniform(0.9, 1.0), length, False)
     travel = rng.uniform(0.8, 1.57)
@@ -115,11 +111,8 @@ def _three_piece(rng: Rng) -> Assembly:
     length = min(rng.uniform(0.05, 0.08), spread - foot_radius - 0.012)
     tip = foot_height + 0.06 + with_tails(rng, (0.0, 0.06), (0.0, 0.3), 0.2)
     spout = _gooseneck(rng, np.array([0.0, 0.0, column]), r, reach, tip)
-    turning = rng.random() < 0.6
-    tap = Assembly("base", base if turning else base + spout.moved((0, 0, -GAP - 0.001)), BRASS)
-    if turning:
-        joint = swivel("base", UP, (0, 0, column), None if rng.random() < 0.6 else rng.uniform(0.9, 2.6))
-        tap.add("spout", spout, joint)
+    tap = Assembly("base", base, BRASS)
+    _add_spout(rng, tap, spout, column, 0.6, 0.6)
     style = int(rng.integers(1 << 30))
     outward = rng.random() < 0.6
     for number, side in enumerate((-1.0, 1.0)):
@@ -198,6 +191,15 @@ def _body(rng: Rng, radius: float, height: float) -> tuple[Solid, float]:
             h = 0.1 * radius
             solid += rod(0, 0, (level - h, level + h), radius * rng.uniform(1.05, 1.2))
     return solid, height
+
+
+def _add_spout(rng: Rng, tap: Assembly, spout: Solid, z: float, turns: float, freely: float) -> None:
+    """A spout that by chance turns on its foot at a height, and then by chance without end."""
+    if rng.random() < turns:
+        limit = None if rng.random() < freely else rng.uniform(0.9, 2.6)
+        tap.add("spout", spout, swivel("base", UP, (0, 0, z), limit))
+    else:
+        tap.body += spout.moved((0, 0, -GAP - 0.001))
 
 
 def _gooseneck(rng: Rng, foot: Array, r: float, reach: float, tip: float) -> Solid:

@@ -132,9 +132,8 @@ def _capped(rng: Rng, section: _Section, length: float, radius: float, turning: 
     # The cap reaches from the barrel's shoulder past the tip; its lower end is closed.
     close = rng.uniform(0.0, 1.2) * radius
     taper = rng.uniform(0.8, 1.15) if not flush else 1.0
-    bottom = -0.001
-    cap = section.sleeve(inner, [(max(outer * taper, inner + 0.5 * wall), bottom), (outer, covered - GAP)])
-    widest = max(outer * taper, inner + 0.5 * wall)
+    bottom, widest = -0.001, max(outer * taper, inner + 0.5 * wall)
+    cap = section.sleeve(inner, [(widest, bottom), (outer, covered - GAP)])
     cap += section.rod([(widest * rng.uniform(0.4, 1.0), bottom - max(close, wall)), (widest, bottom + 0.0002)])
     clip = _clip(rng, section, max(outer, widest), 0.0, covered * rng.uniform(0.55, 0.95))
     if clip.pieces:  # its root is at the closed end
@@ -168,9 +167,8 @@ def _double(rng: Rng, section: _Section, length: float, radius: float) -> Assemb
         covered = length * rng.uniform(0.16, 0.25)
         neck = (radius - wall - GAP) * 0.97
         tip = min(0.6 * covered, 3.0 * radius)
-        half = _tip(rng, section, 0.6 * neck, tip) + section.rod(
-            [(0.6 * neck, tip), (neck, tip + 0.001), (neck, covered + 0.001)]
-        )
+        half = _tip(rng, section, 0.6 * neck, tip)
+        half += section.rod([(0.6 * neck, tip), (neck, tip + 0.001), (neck, covered + 0.001)])
         half = half.moved((0, 0, -covered - 0.25 * length))
         low = -covered - 0.25 * length - 0.001
         cap = section.sleeve(radius - wall, [(radius * rng.uniform(0.95, 1.1), low), (radius, -0.25 * length - GAP)])
@@ -274,9 +272,8 @@ def _sliders(rng: Rng, length: float, radius: float) -> Assembly:
         half_here = min(half, 0.3 * core)
         slider = box((-1.0 * radius, -core - GAP), half_here, (top - size, top))
         slider += box((-1.25 * radius, -0.9 * radius), half_here, (top - 0.5 * size, top), fillet=0.2 * half_here)
-        joint = prismatic("body", (0, 0, -1), 0.0, (room - size) * 0.95, (-radius, 0, top))
         angle = 2.0 * np.pi * k / count
-        turned = slider.turned(UP, angle)
         origin = (-radius * cos(angle), -radius * sin(angle), top)
-        pen.add(f"slider_{k}", turned, prismatic("body", (0, 0, -1), 0.0, joint.upper, origin), density=1000.0)
+        slide = prismatic("body", (0, 0, -1), 0.0, (room - size) * 0.95, origin)
+        pen.add(f"slider_{k}", slider.turned(UP, angle), slide, density=1000.0)
     return pen
