@@ -226,8 +226,8 @@ def _smartphone(rng: Rng, phone: Assembly) -> None:
         body += box((0.5 * thick, thick + bump), about(y, size), about(z, size), fillet=0.5 * size, axis=0, steps=2)
     phone.add("body", body, density=1800.0)
     if chin > 0.1:
-        z = 0.02 * length, (chin - 0.02) * length
-        add_function_keys(rng, phone, "body", front_face(0.0), 0.8 * half, z, 0.0013, 0)
+        upright = 0.02 * length, (chin - 0.02) * length
+        add_function_keys(rng, phone, "body", front_face(0.0), 0.8 * half, upright, 0.0013, 0)
     else:
         face = Face(np.array([0.5 * thick, 0.0, length]), np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0]))
         outline = key_outline("pill", (0.25 * half, 0.3 * thick), 8)
