@@ -27,7 +27,6 @@ Array = NDArray[np.float64]
 PixelCenter = Literal["0", "0.5"]
 """Coordinates of the centre of the first pixel."""
 
-INTRINSICS_FILES = (".json", ".yaml", ".yml", ".txt", ".npy", ".npz")
 FIX = 'write {"fx": ..., "fy": ..., "cx": ..., "cy": ...} in pixels, or "K" of nine numbers'
 _MAX_BYTES = 8_000_000
 """Of a JSON file: scene_camera.json of a thousand images has 0.3 MB, transforms.json 2 MB."""

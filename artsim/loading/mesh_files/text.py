@@ -5,7 +5,6 @@ from __future__ import annotations
 import codecs
 import re
 import warnings
-from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -25,7 +24,7 @@ _MAX_ROWS = 8_000_000
 """For as many faces as a mesh may have, and their vertices; each takes some 20 bytes of memory besides its text."""
 
 FEW_WORDS = 10
-"""Rows whose first words are read one by one. Of more, as many words are named: the most frequent ones."""
+"""First words of rows that are named: the most frequent ones."""
 
 _BLOCK = 1_000_000
 
@@ -138,19 +137,16 @@ class Rows:
         """How many of some rows begin with each word, by its first letters; "..." stands for the rare ones."""
         which = which & (self._starts < self._ends)
         starts, ends = self._starts[which], self._ends[which]
-        if len(starts) <= FEW_WORDS:
-            rows = [self._bytes[a:b].tobytes() for a, b in zip(starts.tolist(), ends.tolist(), strict=True)]
-            heads = sorted(head for row in rows if (head := row.partition(b" ")[0][:_WORD]))
-            few = Counter(head.decode("ascii", "replace") for head in heads)
-            return dict(few.most_common())
+        if len(starts) == 0:
+            return {}
         letters = np.stack([self._bytes[np.minimum(starts + i, ends)] for i in range(_WORD)], axis=1)
         blank = (letters == ord(" ")) | (letters == ord("\n"))
         letters[np.logical_or.accumulate(blank, axis=1)] = 0
         found, counts = np.unique(np.ascontiguousarray(letters).view(">u8"), return_counts=True)
         found, counts = found[found > 0], counts[found > 0]  # without blank rows
         most = np.argsort(-counts, kind="stable")[:FEW_WORDS]
-        words = found[most].astype(">u8").tobytes()
-        texts = [words[at : at + _WORD].rstrip(b"\0").decode("ascii", "replace") for at in range(0, len(words), _WORD)]
+        words = [word.to_bytes(_WORD, "big").rstrip(b"\0") for word in found[most].tolist()]
+        texts = [word.decode("ascii", "replace") for word in words]
         told = {text: int(n) for text, n in zip(texts, counts[most].tolist(), strict=True)}
         others = int(counts.sum() - counts[most].sum())
         return told | {"...": others} if others else told
