@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from artsim.checks.decomposition import check_pieces, union
 from artsim.families import make
 from artsim.loading.decomposition import DecompositionOptions, closed_volume, convex_pieces, decompose, union_volume
 from artsim.model.convex_bodies import convex_hull
 from artsim.model.objects import ArticulatedObject, Body
+from tests.artsim.checks.piece_gates import check_pieces, union
 from tests.artsim.loading.test_decomposition import tray
 from tests.conftest import installed, rigid
 
