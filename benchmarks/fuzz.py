@@ -28,7 +28,7 @@ from artsim.common.files import read_json, write_atomic
 from artsim.common.names import safe_name
 from artsim.common.progress import track
 from artsim.errors import ConfigError
-from tests.fuzz.seeds import Input, corpus, input_at, input_of
+from tests.fuzz.seeds import Input, input_at, input_of, seeds_of
 from tests.fuzz.targets import TARGETS, Finding, examine
 
 _CHUNK = 10_000
@@ -103,10 +103,9 @@ def work(options: Options, first: int, end: int) -> None:
     file = _report_file(options, first)
     report = Report.of(file, first)
     with tempfile.TemporaryDirectory(dir="/dev/shm" if os.access("/dev/shm", os.W_OK) else None) as name:
-        for seed in corpus():  # once, so that imports count for no input
-            if seed.kind in options.kinds:
-                member = next(iter(seed.files))
-                examine(Input(seed, member, seed.files[member]), Path(name))
+        for seed in (seed for kind in options.kinds for seed in seeds_of(kind)):  # once, so that imports count for none
+            member = next(iter(seed.files))
+            examine(Input(seed, member, seed.files[member]), Path(name))
         gc.freeze()
         held = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (held + _HEADROOM, held + _HEADROOM))

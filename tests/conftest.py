@@ -7,7 +7,7 @@ import importlib
 import multiprocessing
 import operator
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from types import ModuleType
@@ -32,6 +32,8 @@ from artsim.renderers import Renderer, make_renderer
 from tests.processors import PROCESSORS, can_run, left_out
 
 T = TypeVar("T")
+MOST_S = 1.0
+"""Processor seconds of a test without the mark `slow`. More is reported, not refused: what comes first compiles."""
 ROOT = Path(__file__).resolve().parent.parent
 ASSETS, CASES = ROOT / "urdf_assets", ROOT / "tests" / "cases"
 DEMO = [ASSETS / name for name in ("laptop", "cabinet", "eyeglasses", "dishwasher", "scissors")]
@@ -76,8 +78,26 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+def processor_seconds() -> float:
+    """Those of this process and of all that it has waited for."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
+    """Note what a test costs, whatever else the machine does meanwhile."""
+    before = processor_seconds()
+    yield
+    item.user_properties.append(("processor_seconds", processor_seconds() - before))
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Which processor this was, and which code the tests of equal bytes leave out."""
+    """Which processor this was, which code the tests of equal bytes leave out, and which tests lack the mark `slow`."""
+    for report in terminalreporter.stats.get("passed", ()):
+        taken = dict(report.user_properties).get("processor_seconds", 0.0)
+        if taken > MOST_S and "slow" not in report.keywords:
+            terminalreporter.write_line(f"{report.nodeid}: {taken:.1f} s of processor time, but not marked slow")
     run = ", ".join(filter(can_run, PROCESSORS)) or "of no other kind"
     terminalreporter.write_line(f"{processor()}, {cores()} of its cores; bytes are compared as on processors {run}")
     for name in PROCESSORS:

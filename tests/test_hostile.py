@@ -312,11 +312,13 @@ def test_each_is_read_or_refused_in_one_line(outcomes: dict[str, dict[str, Any]]
     assert not wrong
 
 
+@pytest.mark.slow
 def test_each_takes_little_time_and_memory(outcomes: dict[str, dict[str, Any]]) -> None:
     figures = {name: (round(one["seconds"], 2), round(one["mb"])) for name, one in outcomes.items()}
     assert not {name: f for name, f in figures.items() if f[0] > SECONDS or f[1] > MB}
 
 
+@pytest.mark.slow
 def test_a_picture_is_written_here_and_nowhere_else(outcomes: dict[str, dict[str, Any]]) -> None:
     (picture,) = next(iter(outcomes.values()))["written"]
     assert picture.startswith("a/b/")
@@ -324,6 +326,7 @@ def test_a_picture_is_written_here_and_nowhere_else(outcomes: dict[str, dict[str
     assert picture.count("/") == 2
 
 
+@pytest.mark.slow
 def test_links_outward_are_not_followed_and_said(outcomes: dict[str, dict[str, Any]]) -> None:
     said = outcomes["meta.json that is a link outward"]["said"]
     assert "secret" not in said

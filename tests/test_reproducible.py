@@ -47,7 +47,8 @@ def made(processor: str) -> dict[str, Any]:
     """What ``tests.reproduce`` makes on a processor."""
     if processor in PROCESSORS and not can_run(processor):
         pytest.skip(left_out(processor))
-    return json.loads(on(processor, "-m", "tests.reproduce"))
+    options = ["--exact"] if processor in PROCESSORS else []  # Embree's code is chosen otherwise
+    return json.loads(on(processor, "-m", "tests.reproduce", *options))
 
 
 @pytest.fixture(scope="module")
@@ -128,6 +129,7 @@ def test_code_that_the_processor_lacks_is_left_out_and_named() -> None:
     assert "AVX-512" in left_out("with AVX-512")
 
 
+@pytest.mark.slow
 def test_a_processor_that_is_stood_in_for_runs_no_code_of_a_newer_one() -> None:
     """NumPy is told what to leave out, and this very module is asked what it would run."""
     asked = "import tests.test_reproducible as t; print(*t.HERE, sep=',')"

@@ -28,6 +28,7 @@ def indices(loader: DataLoader[object], batches: int) -> list[int]:
     return [int(i) for batch in itertools.islice(loader, batches) for i in batch["index"]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("context", ["fork", "spawn", "forkserver"])
 @pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
 def test_workers_of_a_loader_share_a_stream_out(context: str) -> None:
@@ -77,7 +78,8 @@ def _epochs(rank: int, ranks: int, folder: str, results: str) -> None:
     if ranks > 1:
         distributed.init_process_group("gloo", init_method=f"file://{results}/group", rank=rank, world_size=ranks)
     stream = artsim.open_dataset(folder).shuffled(seed=3)
-    loader = DataLoader(stream.padded(), batch_size=5, num_workers=2, multiprocessing_context="spawn")
+    context = ("fork", "spawn")[rank]
+    loader = DataLoader(stream.padded(), batch_size=5, num_workers=2, multiprocessing_context=context)
     seen = []
     for epoch in range(2):
         stream.set_epoch(epoch)
@@ -104,7 +106,7 @@ def test_two_nodes_of_two_workers_see_each_sample_once_in_an_epoch(tmp_path: Pat
 def _rank(rank: int, file: str, results: str) -> None:
     distributed.init_process_group("gloo", init_method=f"file://{file}", rank=rank, world_size=2)
     stream = FamilyStream(["laptop"], SMALL, views_per_object=1).padded(max_parts=2)
-    loader = DataLoader(stream, batch_size=2, num_workers=2, multiprocessing_context="spawn")
+    loader = DataLoader(stream, batch_size=2, num_workers=2, multiprocessing_context="fork")
     Path(results, f"{rank}.json").write_text(json.dumps(indices(loader, 4)))
     distributed.destroy_process_group()
 

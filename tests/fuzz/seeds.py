@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
@@ -71,7 +71,7 @@ def input_at(seed: int, i: int, kinds: Sequence[str]) -> Input:
     """Input ``i`` of a run, out of (seed, i) and the kinds alone."""
     rng = Random(f"{seed}:{i}")
     (kind,) = rng.choices(kinds, [WEIGHTS[kind] for kind in kinds])
-    seeds = [one for one in corpus() if one.kind == kind]
+    seeds = seeds_of(kind)
     chosen = rng.choice(seeds)
     member = rng.choice(list(chosen.files))
     alike = [one.files[member] for one in seeds if member in one.files]
@@ -81,37 +81,29 @@ def input_at(seed: int, i: int, kinds: Sequence[str]) -> Input:
 def input_of(file: Path) -> Input:
     """The input that a file holds which a run, or a test, has stored."""
     kind, name, _, member = file.name.split("-", 3)
-    (seed,) = (one for one in corpus() if (one.kind, one.name) == (kind, name))
+    (seed,) = (one for one in seeds_of(kind) if one.name == name)
     return Input(seed, member.replace("+", "/"), file.read_bytes())
 
 
-@cache
 def corpus() -> tuple[Seed, ...]:
-    """All seeds, always the same ones in the same order."""
+    """All seeds."""
+    return tuple(seed for kind in WEIGHTS for seed in seeds_of(kind))
+
+
+@cache
+def seeds_of(kind: str) -> tuple[Seed, ...]:
+    """All seeds of a kind, always the same ones in the same order."""
     with tempfile.TemporaryDirectory() as name:
         made = Path(name)
         shutil.copytree(FOLDER, made, dirs_exist_ok=True)
-        for file in (FOLDER / "urdf").glob("usda_*/*.usda"):
-            _binary(file, made / "urdf" / file.parent.name.replace("usda", "usdc") / "mobility.usdc")
-        _objects(made)
-        _dataset(made)
-        _estimator(made)
-        _state(made)
-        folders = (folder for kind in WEIGHTS for folder in sorted((made / kind).iterdir()))
-        return tuple(Seed(folder.parent.name, folder.name, dict(_files(folder))) for folder in folders)
+        if kind in MAKERS:
+            MAKERS[kind](made)
+        return tuple(Seed(kind, folder.name, dict(_files(folder))) for folder in sorted((made / kind).iterdir()))
 
 
 def _files(folder: Path) -> Iterator[tuple[str, bytes]]:
     for path in sorted(path for path in folder.rglob("*") if path.is_file() and not path.name.startswith(".")):
         yield path.relative_to(folder).as_posix(), path.read_bytes()
-
-
-def _binary(text: Path, out: Path) -> None:
-    """The same layer in USD's binary format."""
-    from pxr import Sdf
-
-    out.parent.mkdir()
-    Sdf.Layer.FindOrOpen(str(text)).Export(str(out))
 
 
 def small_object() -> ArticulatedObject:
@@ -124,11 +116,21 @@ def small_object() -> ArticulatedObject:
     return assembly.build("box", "7")
 
 
-def _objects(made: Path) -> None:
-    from artsim.export import export
-
+def _object(made: Path) -> None:
     (made / "object" / "npz").mkdir(parents=True)
     save_object(small_object(), made / "object" / "npz" / "o.npz")
+
+
+def _urdf(made: Path) -> None:
+    """Exported files, and USD files in the binary format, too."""
+    from pxr import Sdf
+
+    from artsim.export import export
+
+    for file in (FOLDER / "urdf").glob("usda_*/*.usda"):
+        out = made / "urdf" / file.parent.name.replace("usda", "usdc") / "mobility.usdc"
+        out.parent.mkdir()
+        Sdf.Layer.FindOrOpen(str(file)).Export(str(out))
     for suffix, name in (("mjcf", "mobility.xml"), ("usd", "mobility.usda")):
         export(small_object(), made / "export", [suffix])
         (made / "urdf" / f"exported_{suffix}").mkdir()
@@ -187,3 +189,10 @@ def _state(made: Path) -> None:
     out.mkdir(parents=True)
     for file in run.glob("state*"):
         shutil.copy(file, out)
+
+
+MAKERS: dict[str, Callable[[Path], None]] = {
+    "urdf": _urdf, "object": _object, "dataset": _dataset, "motions": _dataset, "base": _estimator,
+    "estimator": _estimator, "state": _state,
+}  # fmt: skip
+"""What makes the seeds of a kind that are not stored."""

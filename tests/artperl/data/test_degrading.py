@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import islice
 
 import numpy as np
+import pytest
 import torch
 
 from artperl.data.batches import batches
@@ -14,6 +15,7 @@ from artperl.evaluation.samples import frozen_samples
 from artsim.observing.interference import FOREIGN
 
 
+@pytest.mark.slow
 def test_degraded_clouds_have_as_many_points_and_some_are_cut_dirty_and_sparse() -> None:
     (sample,) = frozen_samples(["laptop"], 1, 1)
     made = [degrade(sample, 2048, np.random.default_rng(n)) for n in range(200)]

@@ -26,6 +26,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return generate(sources, tmp_path_factory.mktemp("recorded"), num_samples=24, sample=options).folder
 
 
+@pytest.mark.slow
 def test_a_dataset_is_learnt_from_sample_by_sample(recorded: Path) -> None:
     samples = Recorded(recorded, ["laptop"], 3, 2, 96)
     train = [sample for sample in open_dataset(recorded, "train") if sample.category == "laptop"]
@@ -41,6 +42,7 @@ def test_a_dataset_is_learnt_from_sample_by_sample(recorded: Path) -> None:
         Recorded(recorded, ["laptop"], 0, 2, 1024)
 
 
+@pytest.mark.slow
 def test_an_estimator_for_any_parts_reads_a_dataset_in_the_order_that_it_knows(tmp_path: Path) -> None:
     sources = family_sources(["storage_furniture"], 3)
     folder = generate(sources, tmp_path / "data", num_samples=12, sample=SampleOptions(num_points=64)).folder

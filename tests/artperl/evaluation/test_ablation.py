@@ -47,6 +47,7 @@ def test_every_stage_can_be_taken_away() -> None:
         assert len(without(sample.points).size) == 2, stage
 
 
+@pytest.mark.slow
 def test_an_ablation_goes_on_from_its_file(tmp_path: Path) -> None:
     torch.manual_seed(0)
     save_estimator(Estimator(Perception(2, 16), small_base("laptop")), tmp_path / "laptop", {})

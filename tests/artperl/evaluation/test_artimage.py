@@ -38,6 +38,7 @@ def test_no_real_object_is_both_learnt_from_and_tested_on() -> None:
     assert tested & tuned_on == {"Table/26387"}
 
 
+@pytest.mark.slow
 def test_real_objects_have_the_parts_of_artimage(partnet_dir: Path) -> None:
     for category, joints in ARTIMAGE.items():
         for half in ("train", "test"):
@@ -89,6 +90,7 @@ def test_drawers_as_artimage_has_them_open_to_the_front() -> None:
     assert next_one.object_id != "1509001"
 
 
+@pytest.mark.slow
 def test_rows_are_always_the_same_and_large_enough() -> None:
     one, other = (row_samples("procedural", row_objects("procedural", "drawer", objects=3), 8) for _ in range(2))
     assert len(one) == 9
@@ -98,6 +100,7 @@ def test_rows_are_always_the_same_and_large_enough() -> None:
     assert not np.array_equal(one[0].points, around[0].points)
 
 
+@pytest.mark.slow
 def test_parts_of_real_objects_come_in_the_order_of_procedural_ones(partnet_dir: Path) -> None:
     procedural = [*objects_of(["eyeglasses"], 5, 10), *objects_of(["drawer"], 20, 10)]
     right = [in_reading_order(range(1, len(obj)), obj.box_center, obj.box_size) == list(range(1, len(obj)))

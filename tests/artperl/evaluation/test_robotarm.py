@@ -20,6 +20,7 @@ def clouds() -> list[Sample]:
     return arm_samples(ARM, 3, 2048)
 
 
+@pytest.mark.slow
 def test_points_of_the_arm_lie_on_its_parts_up_to_the_sensors_noise(clouds: list[Sample]) -> None:
     for sample in clouds:
         assert sample.points.shape == (2048, 3)
@@ -39,6 +40,7 @@ def test_masks_take_in_points_of_other_things(clouds: list[Sample]) -> None:
         np.testing.assert_array_equal(np.isnan(sample.npcs).any(axis=1), foreign)
 
 
+@pytest.mark.slow
 def test_the_same_images_come_again(clouds: list[Sample]) -> None:
     again = arm_samples(ARM, 1, 2048)[0]
     np.testing.assert_array_equal(again.points, clouds[0].points)

@@ -104,6 +104,7 @@ def test_a_batch_gives_what_its_objects_give_alone(drawers: tuple[Shapes, Observ
         torch.testing.assert_close(single.theta.state[0], together.theta.state[b, :K], atol=2e-3, rtol=0.0)
 
 
+@pytest.mark.slow
 def test_hinges_lean_as_the_points_say_and_as_far_as_they_may() -> None:
     """References whose hinges lean by six degrees the other way; both hinges of a pair lean together."""
     objects, samples = views("eyeglasses", 32, first_seed=30)

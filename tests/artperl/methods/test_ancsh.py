@@ -127,7 +127,8 @@ def test_true_answers_have_no_loss() -> None:
     assert miou_loss(20.0 * torch.tensor([[[1.0, 0.0], [0.0, 1.0]]]), torch.tensor([[1, 0]])).item() > 0.99
 
 
-def test_a_saved_estimator_loads_to_the_same_estimates(tmp_path: Path) -> None:
+def test_networks_from_disk_say_what_they_said_and_images_take_the_method_by_its_folder(tmp_path: Path) -> None:
+    """RANSAC on untrained networks may choose other triples: what the networks say is compared, not the poses."""
     torch.manual_seed(0)
     base, sample = ShapeBase.of([artsim.make("laptop", n) for n in range(3)], 32), view(artsim.make("laptop", 5), 2)
     networks = ancsh_networks(ANCSHSizes(2, 16))
@@ -136,20 +137,11 @@ def test_a_saved_estimator_loads_to_the_same_estimates(tmp_path: Path) -> None:
     method = ANCSH(**networks, base=base)
     save_estimator(method, tmp_path, {})
     loaded = load_estimator(tmp_path, method="ancsh")
-    for network, other in ((method.coordinates, loaded.coordinates), (method.joints, loaded.joints)):
-        for name, weights in network.state_dict().items():
-            assert torch.equal(weights, other.state_dict()[name])
-    # Sums over weights that lie elsewhere in memory may be rounded otherwise. RANSAC on untrained networks then may
-    # choose other triples, so what the networks say of a cloud is compared and not the poses.
     points = torch.from_numpy(sample.points[None].astype(np.float32))
     with torch.inference_mode():
         before, after = method.coordinates(points), loaded.coordinates(points)
         for name in ("part_logits", "npcs", "scale", "shift"):
             torch.testing.assert_close(getattr(after, name), getattr(before, name), rtol=1e-3, atol=1e-4)
-    assert loaded.options == method.options
-    torch.testing.assert_close(loaded.base.shapes.points, method.base.shapes.points, rtol=1e-3, atol=1e-3)  # in halves
-    assert np.isfinite(loaded(sample.points).T_camera_part).all()
-    # Images of several objects take it by its folder, whatever its method.
     obj, camera = artsim.make("laptop", 5).with_diagonal(0.4), artsim.Camera.look_at((-0.9, 0.35, 0.6), (0, 0, 0))
     frame = artsim.render(obj, obj.tree.rest, camera)
     told = mask_record(frame.part_ids != BACKGROUND)
@@ -164,18 +156,3 @@ def test_objects_with_different_trees_are_refused_before_anything_is_learnt(tmp_
     options = replace(ANCSH_PRESETS["quick"], categories=("laptop", "drawer"), base_objects=2)
     with pytest.raises(ConfigError, match="different kinematic trees"):
         Training(options, tmp_path)
-
-
-@pytest.mark.slow
-def test_training_learns_both_networks_and_its_estimator_is_scored(tmp_path: Path) -> None:
-    options = replace(
-        ANCSH_PRESETS["quick"], base_objects=3, width=16, perception_steps=2, batch_size=4, num_points=96,
-        test_objects=1, test_views=1,
-    )  # fmt: skip
-    training = Training(options, tmp_path, workers=0, progress=False)
-    networks = training.context.state.networks
-    before = {name: [p.detach().clone() for p in network.parameters()] for name, network in networks.items()}
-    figures = training.run()
-    for name, network in networks.items():
-        assert any((p != q).any() for p, q in zip(network.parameters(), before[name], strict=True)), name
-    assert figures["laptop"]["instances"] == 1

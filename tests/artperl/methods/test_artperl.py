@@ -16,9 +16,7 @@ from artperl.agent.ppo import PPOOptions, rollout
 from artperl.agent.start import MeanView
 from artperl.core.shapes import Observed
 from artperl.evaluation.metrics import rotation_error
-from artperl.evaluation.scoring import evaluate
 from artperl.fitting.refine_options import RefineOptions
-from artperl.methods import METHODS, method_of
 from artperl.methods.artperl import ArtPERL, ArtPERLOptions
 from artperl.methods.estimator_files import load_estimator, save_estimator
 from artperl.methods.retrieved import Sizes
@@ -26,8 +24,6 @@ from artperl.perception.segmentation import Segmentation
 from artperl.retrieval.shape_base import ShapeBase
 from artperl.retrieval.siamese import by_siamese
 from artperl.training.fitting_problems import part_truth
-from artperl.training.options import PAPER_PRESETS
-from artperl.training.run import Training
 from artsim.errors import ConfigError, DatasetError
 from artsim.observing.sample import Sample
 from tests.artperl.worlds import view
@@ -128,26 +124,6 @@ def test_the_deployed_policy_is_the_learnt_one(base: ShapeBase) -> None:
     assert torch.equal(often.argmax(-1)[clear], taken[clear])
 
 
-def test_a_saved_estimator_loads_to_the_same_estimates(base: ShapeBase, tmp_path: Path) -> None:
-    method, sample = untrained(base), view(artsim.make("laptop", 5), 2)
-    for network in method.networks().values():
-        network.half().float()  # as precise as files are
-    method.base = by_siamese(base, method.siamese)
-    save_estimator(method, tmp_path, {"options": {"categories": ["laptop"]}})
-    loaded = load_estimator(tmp_path, method="artperl")
-    assert loaded.options == method.options
-    one, other = method(sample.points), loaded(sample.points)
-    assert one.reference == other.reference
-    assert (one.part == other.part).all()
-    # Files round the base. The labels of a new network tell the refinement little, so that its end may differ.
-    np.testing.assert_allclose(one.trajectory[:-1], other.trajectory[:-1], atol=1e-3)
-    save_estimator(loaded, tmp_path / "again", {"options": {"categories": ["laptop"]}})
-    again = load_estimator(tmp_path / "again", method="artperl")(sample.points)
-    np.testing.assert_array_equal(again.T_camera_part, other.T_camera_part)
-    with pytest.raises(DatasetError, match=r"method 'artperl', not full.*--method artperl"):
-        load_estimator(tmp_path)
-
-
 def test_the_method_without_shipped_weights_says_how_to_train_it() -> None:
     with pytest.raises(
         DatasetError, match=r"train it: python train.py --category stapler --method artperl --preset long"
@@ -170,34 +146,3 @@ def test_damaged_settings_are_refused(base: ShapeBase, tmp_path: Path) -> None:
         (tmp_path / "estimator.json").write_text(settings.replace(old, new))
         with pytest.raises(DatasetError):
             load_estimator(tmp_path, method="artperl")
-
-
-def test_every_method_of_the_registry_is_found_by_its_name() -> None:
-    for name in METHODS:
-        assert method_of(name).name == name
-
-
-@pytest.mark.slow
-def test_training_learns_all_networks_and_its_estimator_is_scored(tmp_path: Path) -> None:
-    options = replace(
-        PAPER_PRESETS["quick"], base_objects=3, reference_points=48, width=16, perception_steps=3, retrieval_steps=2,
-        retrieval_objects=3, batch_size=4, num_points=96, agent_rollouts=2, episodes=2, test_objects=1, test_views=1,
-    )  # fmt: skip
-    heard: dict[str, list[dict[str, float]]] = {}
-
-    def report(group: str, figures: dict[str, float], step: int) -> None:
-        heard.setdefault(group, []).append(figures)
-
-    training = Training(options, tmp_path, workers=0, progress=False, report=report)
-    networks = training.context.state.networks
-    before = {name: [p.detach().clone() for p in network.parameters()] for name, network in networks.items()}
-    training.run()
-    assert {name: len(figures) for name, figures in heard.items()} == {
-        "segmentation": 3, "retrieval": 2, "agent": 2, "validation": 1,
-    }  # fmt: skip
-    for name, network in networks.items():
-        assert any((p != q).any() for p, q in zip(network.parameters(), before[name], strict=True)), name
-    method = load_estimator(tmp_path / "best", method="artperl")
-    (scored,) = evaluate(method, [view(artsim.make("laptop", 9), 4)])
-    assert np.isfinite(scored.rotation).all()
-    assert (tmp_path / "table.txt").exists()

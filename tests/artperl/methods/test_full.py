@@ -65,18 +65,6 @@ def test_clouds_of_any_number_of_points(estimator: Estimator, sample: Sample, co
     assert np.isfinite(estimate.T_camera_part).all()
 
 
-@pytest.mark.parametrize(
-    "cloud", [np.zeros((0, 3)), np.full((100, 3), np.nan), np.zeros((100, 3)), np.zeros((5, 3)), np.zeros((10, 2))]
-)
-def test_clouds_of_nothing_are_refused(estimator: Estimator, cloud: np.ndarray) -> None:
-    with pytest.raises(ArtsimError, match="points"):
-        estimator(cloud)
-
-
-def test_the_same_cloud_gives_the_same_estimate(estimator: Estimator, sample: Sample) -> None:
-    assert np.array_equal(estimator(sample.points).T_camera_part, estimator(sample.points).T_camera_part)
-
-
 def test_an_estimate_takes_one_thread_and_leaves_torch_as_it_was(estimator: Estimator, sample: Sample) -> None:
     before, used = torch.get_num_threads(), []
     hook = estimator.perception.register_forward_hook(lambda *_: used.append(torch.get_num_threads()))

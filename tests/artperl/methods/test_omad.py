@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,16 +13,13 @@ from artperl.data.batches import row_batches
 from artperl.data.categories import objects_of
 from artperl.data.sources import DataOptions
 from artperl.data.truth import to_batch
-from artperl.evaluation.metrics import rotation_error, true_poses
-from artperl.methods.estimator_files import load_estimator, save_estimator
+from artperl.evaluation.metrics import rotation_error
 from artperl.methods.omad import OMAD, OMADOptions, OMADSizes, omad_networks, state_range
 from artperl.perception.omad_networks import CueNetwork, Cues
 from artperl.retrieval.shape_base import ShapeBase
 from artperl.training.omad_stages import ObjectRows, cue_loss, cue_targets, prior_loss
-from artperl.training.options import OMAD_PRESETS, TrainOptions
-from artperl.training.run import Training
+from artperl.training.options import TrainOptions
 from artsim.errors import ConfigError
-from tests.artperl.worlds import view
 
 
 def learnt(base: ShapeBase, steps: int = 200) -> OMAD:
@@ -97,33 +93,6 @@ def test_the_prior_learns_the_boxes_and_the_joints_of_its_objects() -> None:
     assert after["joint"] < 0.05
 
 
-def test_a_saved_estimator_loads_to_the_same_estimates(tmp_path: Path) -> None:
-    method = learnt(ShapeBase.of([artsim.make("laptop", n) for n in range(3)], 48), 0)
-    for network in method.networks().values():
-        network.half().float()  # as precise as files are
-    save_estimator(method, tmp_path, {})
-    sample = view(artsim.make("laptop", 5), 2)
-    one, other = method(sample.points), load_estimator(tmp_path, method="omad")(sample.points)
-    np.testing.assert_allclose(one.T_camera_part, other.T_camera_part, atol=1e-5)
-    assert np.isfinite(one.size).all()
-    assert len(true_poses(sample)[0]) == len(one.rotation)
-
-
 def test_objects_that_are_stretched_are_refused() -> None:
     with pytest.raises(ConfigError, match="learns from whole objects"):
         TrainOptions(method="omad", stretched=0.5)
-
-
-@pytest.mark.slow
-def test_training_learns_both_networks(tmp_path: Path) -> None:
-    options = replace(
-        OMAD_PRESETS["quick"], base_objects=3, reference_points=48, width=16, prior_steps=3, perception_steps=2,
-        batch_size=4, num_points=96, test_objects=1, test_views=1,
-    )  # fmt: skip
-    training = Training(options, tmp_path, workers=0, progress=False)
-    networks = training.context.state.networks
-    before = {name: [p.detach().clone() for p in network.parameters()] for name, network in networks.items()}
-    figures = training.run()
-    for name, network in networks.items():
-        assert any((p != q).any() for p, q in zip(network.parameters(), before[name], strict=True)), name
-    assert figures["laptop"]["instances"] == 1

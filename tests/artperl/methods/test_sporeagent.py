@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 import pytest
 import torch
@@ -14,14 +11,11 @@ from artperl.agent.registration import part_goals, part_problems
 from artperl.agent.start import MeanView, mean_start
 from artperl.core.shapes import Observed
 from artperl.evaluation.metrics import rotation_error
-from artperl.methods.estimator_files import load_estimator, save_estimator
 from artperl.methods.retrieved import Sizes
 from artperl.methods.sporeagent import SporeAgent, posed_apart
 from artperl.retrieval.shape_base import ShapeBase
 from artperl.retrieval.siamese import by_siamese
 from artperl.training.fitting_problems import part_truth
-from artperl.training.options import SPOREAGENT_PRESETS
-from artperl.training.run import Training
 from tests.artperl.worlds import view
 
 
@@ -59,26 +53,3 @@ def test_a_policy_that_does_nothing_leaves_the_parts_where_the_reference_has_the
     np.testing.assert_allclose(turn @ axis, axis, atol=1e-5)  # still one kinematic object
     assert estimate.joint_limits[1, 0] <= estimate.state[1] <= estimate.joint_limits[1, 1]
     assert len(estimate.part) == 2048
-
-
-def test_a_saved_estimator_loads_to_the_same_estimates(method: SporeAgent, tmp_path: Path) -> None:
-    save_estimator(method, tmp_path, {})
-    loaded = load_estimator(tmp_path, method="sporeagent")
-    points = view(artsim.make("laptop", 5), 2).points
-    np.testing.assert_allclose(method(points).T_camera_part, loaded(points).T_camera_part, atol=2e-3)
-
-
-@pytest.mark.slow
-def test_training_learns_all_networks(tmp_path: Path) -> None:
-    options = replace(
-        SPOREAGENT_PRESETS["quick"], base_objects=3, reference_points=48, width=8, perception_steps=2,
-        retrieval_steps=2, retrieval_objects=3, batch_size=4, num_points=96, agent_rollouts=2, episodes=2,
-        test_objects=1, test_views=1,
-    )  # fmt: skip
-    training = Training(options, tmp_path, workers=0, progress=False)
-    networks = training.context.state.networks
-    before = {name: [p.detach().clone() for p in network.parameters()] for name, network in networks.items()}
-    figures = training.run()
-    for name, network in networks.items():
-        assert any((p != q).any() for p, q in zip(network.parameters(), before[name], strict=True)), name
-    assert figures["laptop"]["instances"] == 1

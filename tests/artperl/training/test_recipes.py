@@ -75,6 +75,7 @@ def test_options_that_contradict_each_other_are_refused(change: dict[str, object
         changed(TrainOptions(), change)
 
 
+@pytest.mark.slow
 def test_an_estimator_says_which_recipe_made_it_and_from_what(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -16,7 +16,7 @@ from artsim.errors import ConfigError
 
 TINY = TrainOptions(
     method="ancsh", base_objects=3, reference_points=32, width=16, perception_steps=60, batch_size=4, num_points=128,
-    validate_every=1000, test_objects=1, validation_views=1, test_views=1,
+    validate_every=1000, test_objects=1, validation_views=1, test_views=1, retrieval_objects=3, foreign_categories=1,
 )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ TINY = TrainOptions(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("brief_fits")
 @pytest.mark.parametrize(("method", "stage"), [("ancsh", "joints"), ("omad", "cues")])
 def test_the_best_of_several_validations_is_kept(tmp_path: Path, method: StoredMethod, stage: str) -> None:
     options = replace(TINY, method=method, prior_steps=3 if method == "omad" else 0)

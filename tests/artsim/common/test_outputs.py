@@ -38,6 +38,7 @@ def _bytes(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.slow
 def test_an_input_is_not_overwritten_by_its_page(laptop: Path, tmp_path: Path) -> None:
     before = _bytes(laptop)
     link = tmp_path / "link.html"
@@ -53,6 +54,7 @@ def test_an_input_is_not_overwritten_by_its_page(laptop: Path, tmp_path: Path) -
     View(laptop, html=laptop / "page.html").run()  # a result may be written again
 
 
+@pytest.mark.slow
 def test_files_of_a_dataset_are_not_overwritten(dataset: Path) -> None:
     before = _bytes(dataset)
     own = [
@@ -98,6 +100,7 @@ def test_what_was_read_is_an_input_by_any_path(tmp_path: Path, monkeypatch: pyte
     write_output(Path("b"), b"2")
 
 
+@pytest.mark.slow
 def test_folders_of_others_are_not_replaced(laptop: Path, tmp_path: Path) -> None:
     """A folder goes only where artsim wrote it, and nothing in it is an input."""
     shutil.copytree(laptop, tmp_path / "some" / "0")

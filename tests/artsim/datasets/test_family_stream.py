@@ -5,12 +5,14 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+import pytest
 
 from artsim.datasets.family_stream import FamilyStream
 from artsim.families import FAMILIES
 from tests.conftest import in_another_process
 
 
+@pytest.mark.slow
 def test_a_stream_never_ends_and_repeats_itself_exactly() -> None:
     stream = FamilyStream(["laptop", "drawer"], views_per_object=2)
     first = list(itertools.islice(stream, 8))
@@ -24,6 +26,7 @@ def test_a_stream_never_ends_and_repeats_itself_exactly() -> None:
     assert [twice.object(n).category for n in range(6)] == ["laptop", "drawer", "drawer"] * 2
 
 
+@pytest.mark.slow
 def test_the_plan_of_an_object_has_the_joints_that_the_object_has() -> None:
     stream = FamilyStream(sorted(FAMILIES))
     for n in range(len(FAMILIES)):

@@ -39,6 +39,7 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make(tmp_path_factory.mktemp("large") / "out", 120).folder
 
 
+@pytest.mark.slow
 def test_an_extended_dataset_has_the_bytes_of_a_large_one(large: Path, tmp_path: Path) -> None:
     out = make(tmp_path / "out", 50).folder
     before = {path.name: path.stat().st_mtime_ns for path in out.glob("*.tar")}

@@ -42,6 +42,7 @@ def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(preparing, "_LOOK", 0.1)
 
 
+@pytest.mark.slow
 @quick
 def test_one_machine_of_three_is_gone_and_its_objects_are_prepared_by_others(tmp_path: Path) -> None:
     make(tmp_path / "local")

@@ -154,6 +154,7 @@ def test_objects_and_samples_show_themselves(tmp_path: Path) -> None:
     assert obj._repr_html_().startswith("<iframe srcdoc=")
 
 
+@pytest.mark.slow
 def test_the_program_writes_pages_of_objects_and_datasets(tmp_path: Path) -> None:
     View(ASSETS / "laptop", html=tmp_path / "laptop.html").run()
     artsim.generate(find_sources([ASSETS / "laptop"]), tmp_path / "set", 3, splits=(1, 0, 0), progress=False)

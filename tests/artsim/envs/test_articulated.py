@@ -252,6 +252,7 @@ def _steps(env: gymnasium.Env[Any, Any]) -> int:
     raise AssertionError("it does not end")
 
 
+@pytest.mark.slow
 def test_the_length_is_what_gymnasium_is_told() -> None:
     small = {**SMALL, "num_points": 8, "categories": "laptop", "physics": "mujoco"}
     assert _steps(gymnasium.make(ID, max_episode_steps=130, **small)) == 130

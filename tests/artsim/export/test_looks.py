@@ -28,6 +28,7 @@ def exported(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     return obj, folder
 
 
+@pytest.mark.slow
 def test_looks_cover_the_surface_of_each_part(exported: Exported) -> None:
     obj, _ = exported
     finish = draw_finish(as_robot(obj))
@@ -103,6 +104,7 @@ def test_usd_binds_every_face_to_a_material_and_passes_the_validators(exported: 
     assert faults == [], [e.GetMessage() for e in faults]
 
 
+@pytest.mark.slow
 def test_textures_are_files_of_usd_too(tmp_path: Path) -> None:
     obj = make("storage_furniture", 0)
     export(obj, tmp_path, ["usd"], options=OPTIONS)

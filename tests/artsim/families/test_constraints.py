@@ -66,6 +66,7 @@ def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(artsim.families, "DRAWS", 30)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_draws")
 def test_what_a_category_does_not_reach_is_told_with_what_it_does() -> None:
     with pytest.raises(ConfigError) as refused:
@@ -192,6 +193,7 @@ def test_furniture_stands_on_legs_and_has_handles_where_that_is_asked_for(seed: 
     assert make("microwave", seed, handles=False).features == ()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_draws")
 def test_handles_that_are_parts_count_as_handles() -> None:
     assert make("bucket", 0, handles=True).sha256 == make("bucket", 0).sha256

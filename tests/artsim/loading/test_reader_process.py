@@ -59,6 +59,7 @@ def test_one_process_serves_many_files_and_reads_where_it_is_asked(
     assert first != os.getpid()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("what", "amount", "message"),
     [

@@ -83,6 +83,7 @@ BOMBS: dict[str, Callable[[], str]] = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", BOMBS)
 def test_what_expands_without_bound_is_refused_at_once(case: str, tmp_path: Path) -> None:
     path = written(tmp_path, PAIR)
@@ -91,12 +92,14 @@ def test_what_expands_without_bound_is_refused_at_once(case: str, tmp_path: Path
         load(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["ancestral_ref_bomb", "ancestral_inherit_bomb"])
 def test_arcs_of_ancestors_are_counted(case: str) -> None:
     with pytest.raises(AssetError, match=TOO_MUCH):
         load(SECOND / "hostile" / "A03_usd_ancestral_reference_bomb" / case / "mobility.usda")
 
 
+@pytest.mark.slow
 def test_layers_that_take_in_each_other_are_refused(tmp_path: Path) -> None:
     head = "#usda 1.0\n(\n"
     for n in range(20):

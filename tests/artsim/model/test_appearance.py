@@ -82,6 +82,7 @@ def test_a_sun_of_strength_1_shows_a_surface_in_its_own_colour(sapien: Renderer)
     assert seen_from_above((floor(),), slanting, sapien)[32, 32] == pytest.approx(half, abs=0.012)
 
 
+@pytest.mark.slow
 def test_a_sky_of_strength_1_shows_a_level_surface_in_its_own_colour(sapien: Renderer) -> None:
     sky = Lights(Sun((0.0, 0.0, -1.0), NONE), (1.0, 1.0, 1.0), NONE)
     open_air = seen_from_above((floor(),), sky, sapien, samples=8)[32, 32]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -25,6 +26,7 @@ def test_a_map_keeps_the_ends_and_the_order(edges: list[float], draw: int) -> No
     assert SPREAD > 0
 
 
+@pytest.mark.slow
 @given(category=st.sampled_from(CATEGORIES), seed=st.integers(0, 5), draw=st.integers(0, 99))
 def test_factors_of_coupled_axes_commute_with_every_joint(category: str, seed: int, draw: int) -> None:
     obj = artsim.make(category, seed)
@@ -56,6 +58,7 @@ def check_factors(obj: artsim.ArticulatedObject, draw: int) -> None:
         np.testing.assert_allclose(transform_points(its_poses[k], large.parts[k].vertices), expected, atol=1e-9)
 
 
+@pytest.mark.slow
 @given(category=st.sampled_from(CATEGORIES), seed=st.integers(0, 5), draw=st.integers(0, 99))
 def test_maps_between_edges_commute_with_joints_that_leave_the_axis_alone(category: str, seed: int, draw: int) -> None:
     obj, rng = artsim.make(category, seed), np.random.default_rng(draw)

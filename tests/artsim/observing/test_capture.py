@@ -62,6 +62,7 @@ def test_points_lie_on_their_own_posed_part_of_real_objects(category: str, partn
             assert list(sample_problems(sample, obj.scaled(sample.scale))) == []
 
 
+@pytest.mark.slow
 def test_every_other_real_object_gives_a_sound_sample(partnet_dir: Path) -> None:
     for source in find_sources([partnet_dir])[::2]:
         obj = artsim.load(source.path)

@@ -25,6 +25,7 @@ def view() -> Sample:
     return _view()
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(st.floats(0.0, 1.0), st.floats(0.0, 0.9), st.booleans(), st.integers(0, 1000))
 def test_shares_are_what_is_asked_for(view: Sample, hidden: float, outlier_share: float, spot: bool, seed: int) -> None:

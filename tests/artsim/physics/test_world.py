@@ -317,6 +317,7 @@ def test_options_that_make_no_sense_are_refused(options: dict[str, float]) -> No
         PhysicsOptions(**options)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_where_pybullet_is_missing_mujoco_moves_objects() -> None:
     program = """
 import sys; sys.modules["pybullet"] = None

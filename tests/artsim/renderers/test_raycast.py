@@ -61,6 +61,7 @@ def test_a_scaled_object_seen_from_as_far_away_looks_the_same() -> None:
     assert np.abs(7 * frame.depth - large.depth)[same].max() < 1e-5
 
 
+@pytest.mark.slow
 def test_only_the_projected_outline_is_cast_and_nothing_is_lost() -> None:
     for path in DEMO:
         obj, rng = artsim.load(path), np.random.default_rng(5)

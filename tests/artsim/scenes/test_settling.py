@@ -33,6 +33,7 @@ def things(scene: Scene) -> list[Thing]:
     return [*scene.instances, *scene.distractors]
 
 
+@pytest.mark.slow
 def test_nothing_is_in_another_or_in_the_table(scenes: list[Scene]) -> None:
     for scene in scenes:
         own = things(scene)

@@ -78,6 +78,7 @@ def test_variations_of_our_own_exports_stay_ready_for_simulators(category: str, 
         assert [str(gate) for gate in check_file(load(folder), folder) if not gate.passed] == []
 
 
+@pytest.mark.slow
 def test_files_pass_what_the_original_passes_and_say_how_they_were_made(partnet_dir: Path, tmp_path: Path) -> None:
     folder = sorted((partnet_dir / "StorageFurniture").iterdir())[1]
     summary = write_variations(folder, tmp_path, 4, 7, [partnet_dir / "StorageFurniture"], progress=False)

@@ -41,6 +41,7 @@ def test_the_volume_of_a_stretched_box_is_that_of_its_slabs() -> None:
     assert mesh_of(new.parts[0].vertices, new.parts[0].faces).volume == pytest.approx(4.0)
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 9), knots=st.lists(st.integers(-400, 400), min_size=1, max_size=4, unique=True))
 def test_bodies_of_a_stretched_object_are_convex_and_their_union_is_its_surface(seed: int, knots: list[int]) -> None:
     """Knots are a millimetre apart at least: edges of parts that are nearer to each other count as one."""

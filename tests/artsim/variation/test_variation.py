@@ -62,6 +62,7 @@ def test_variations_of_a_loaded_object_differ_in_their_trees() -> None:
     assert len({vary(obj, seed).tree for seed in range(6)}) == 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("category", REAL)
 def test_variations_of_real_objects_hold_what_the_originals_do(category: str, partnet_dir: Path) -> None:
     folders = sorted(folder for folder in (partnet_dir / category).iterdir() if folder.is_dir())[:3]

@@ -159,6 +159,7 @@ def test_each_is_read_or_refused_in_one_line(outcomes: dict[str, dict[str, Any]]
     assert not wrong
 
 
+@pytest.mark.slow
 def test_each_takes_little_time_and_memory(outcomes: dict[str, dict[str, Any]]) -> None:
     figures = {name: (round(one["seconds"], 2), round(one["mb"])) for name, one in outcomes.items()}
     assert not {name: f for name, f in figures.items() if f[0] > SECONDS or f[1] > MB}
