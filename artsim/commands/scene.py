@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,6 +11,7 @@ import tyro
 
 from artsim.commands.having import Workers
 from artsim.commands.printing import print_made, resumable
+from artsim.common.progress import say, track
 from artsim.scenes.dataset import open_scenes
 from artsim.scenes.generate import SceneRun, generate_scenes
 
@@ -48,6 +50,12 @@ class Scene(Workers):
     """Also write the finished scenes in these formats, into the folder <out>_<format>. coco: images and instance masks.
     bop: models, poses and masks of parts."""
 
+    simulate: bool = False
+    """Also write the scenes so that they simulate, into the folder <out>_simulation: objects with free joints in one
+    MJCF file, one USD file, and URDF files with their places. Joints that would meet another object are named."""
+    base: Literal["fixed", "free"] = "fixed"
+    """With --simulate. fixed: objects are fixed where they stand; free: they can be pushed (MJCF, USD)."""
+
     def run(self) -> None:
         from artsim.drawing.scene_overview import overview_files
         from artsim.scenes.convert import convert_scenes
@@ -70,3 +78,19 @@ class Scene(Workers):
         print_made(result.folder, f"{result.total} scenes", result.made, "scenes", result.seconds)
         for folder in converted:
             print(f"wrote {folder}")
+        if self.simulate:
+            self._simulations()
+
+    def _simulations(self) -> None:
+        from artsim.scenes.random_scene import make_scene
+        from artsim.scenes.simulation import write_simulation
+
+        out = self.out.with_name(f"{self.out.name}_simulation")
+        recipe = {"scene": self.options.recipe()["scene"], "base": self.base, "artsim_version": version("artsim")}
+        for seed in track("simulations", range(self.seed, self.seed + self.scenes), unit="scene"):
+            scene = make_scene(self.options.scene, seed)
+            written = write_simulation(scene, out / f"{seed:06d}", self.base, {**recipe, "seed": seed})
+            if written.blocked:
+                say(f"{written.folder}: {len(written.blocked)} joints would meet another object somewhere: "
+                    f"{', '.join(written.blocked[:6])}")  # fmt: skip
+        print(f"wrote {out}")

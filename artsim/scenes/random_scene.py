@@ -19,7 +19,7 @@ from artsim.loading.roots import PackageRoots
 from artsim.model.appearance import Colour, Lights, Sun
 from artsim.model.appearance.finishes import draw_coats, repaint_coats
 from artsim.model.camera import Camera
-from artsim.model.draws import StateOptions, sample_state
+from artsim.model.draws import StateOptions, joint_intervals, posed_bounds, sample_state
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 from artsim.model.transforms import transform_points
@@ -38,6 +38,8 @@ _CROWD = 2.5  # of the sum of footprints: the area that things are spread over
 _CLOSER = 0.6  # of that area in a crowded scene
 _ATTEMPTS = 4  # arrangements that are begun before a scene is given up
 _STATES = 200  # that are drawn for a bolted object: of those of an arm, one in ten to one in two stays above its base
+_SWEPT = 7  # states over the range of a joint, for which a row leaves room
+_ROW_GAP = 0.05  # metres between these spaces
 _KIN = {"knife": "folding_knife", "table": "drawer"}
 """Families whose sizes the real objects of other categories have."""
 
@@ -87,8 +89,9 @@ class SceneOptions:
     its category."""
     package_root: PackageRoots = field(default_factory=dict)
     """Folders that package:// names of these files stand for, where they are not found as they are; repeatable."""
-    place: Literal["auto", "table", "floor"] = "auto"
-    """table or floor; auto: on the floor if any object is too large for a table."""
+    place: Literal["auto", "table", "floor", "row"] = "auto"
+    """table or floor; auto: on the floor if any object is too large for a table. row: upright on the floor, side by
+    side as in a kitchen, with room for every joint's whole range."""
     distractors: int = 3
     """Everyday things besides: books, cans, mugs, fruit."""
     count: tuple[int, int] | None = None
@@ -119,8 +122,10 @@ class SceneOptions:
             raise ConfigError(f"{self.diagonal} is no range of metres", "diagonal", "write LOW HIGH, such as 0.18 0.38")
         if self.bolted and self.settle:
             raise ConfigError("what is bolted down does not fall", "bolted, settle", "leave one of them out")
-        if self.place not in ("auto", "table", "floor"):
-            raise ConfigError(f"there is no place {self.place!r}", "place", "use auto, table or floor")
+        if self.place not in ("auto", "table", "floor", "row"):
+            raise ConfigError(f"there is no place {self.place!r}", "place", "use auto, table, floor or row")
+        if self.place == "row" and self.settle:
+            raise ConfigError("what stands in a row does not fall", "place, settle", "leave one of them out")
         if not (self.categories or self.objects or self.obj):
             raise ConfigError("a scene needs an object", "categories", "name one, such as laptop")
 
@@ -160,8 +165,12 @@ def make_scene(options: SceneOptions, seed: int) -> Scene:
         options.place == "auto" and all(obj.diagonal <= _TABLE_DIAGONAL for obj in objects)
     )
     solids = [*zip(objects, states, coats, strict=True), *((obj, np.zeros(1), coat) for obj, coat in others)]
+    things: list[Thing] | None
     for attempt in range(_ATTEMPTS):
         area = _area(solids, on_table, attempt, options.crowded)
+        if options.place == "row":
+            things, area = stand_in_row(solids)
+            break
         bolted = len(objects) if options.bolted else 0
         things = settle(solids, area, rng) if options.settle else _arrange(solids, area, rng, options.crowded, bolted)
         if things is not None:
@@ -219,7 +228,7 @@ def _objects(options: SceneOptions, seed: int) -> list[ArticulatedObject]:
             [kind[i - low] for i in sorted(drawn) if low <= i < low + len(kind)]
             for kind, low in zip((categories, sources, own), places, strict=False)
         )
-    small = options.place != "floor" and options.diagonal is None
+    small = options.place not in ("floor", "row") and options.diagonal is None
     made = [_draw_object(category, small, rng) for category in categories]
     loaded = [_in_usual_size(source.load(), int(rng.integers(2**31))) for source in sources]
     objects = [*made, *loaded, *own]
@@ -293,6 +302,27 @@ def _arrange(
             return None
         placed[number] = thing
     return [placed[number] for number in range(len(solids))]
+
+
+def stand_in_row(solids: Sequence[Placeable]) -> tuple[list[Thing], Area]:
+    """Things upright side by side along Y, their backs at x = 0, with room between them for every joint's range."""
+    things, y = list[Thing](), 0.0
+    for obj, q, coats in solids:
+        intervals = joint_intervals(obj)
+        states = [obj.tree.rest, q, *intervals.T]
+        for k in obj.tree.free_joints:
+            for value in np.linspace(intervals[k, 0], intervals[k, 1], _SWEPT):
+                states.append(np.where(np.arange(len(q)) == k, value, obj.tree.rest))
+        low, high = posed_bounds(obj, obj.tree.complete_state(np.array(states)))
+        T = np.eye(4)
+        T[:3, 3] = -high[:, 0].max(), y - low[:, 1].min(), -obj.bounds[0, 2]
+        y += high[:, 1].max() - low[:, 1].min() + _ROW_GAP
+        things.append(Thing(obj, q, T, coats))
+    shift = 0.5 * (y - _ROW_GAP)
+    for thing in things:
+        thing.T_world_object[1, 3] -= shift
+    front = min(float(thing.vertices[:, 0].min()) for thing in things)
+    return things, Area((front - _ROW_GAP, -shift), (_ROW_GAP, shift))
 
 
 def _supports(area: Area, on_table: bool, rng: np.random.Generator) -> list[Thing]:

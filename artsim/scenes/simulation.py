@@ -1,0 +1,227 @@
+"""Scenes that simulate: objects with free joints in one MJCF file, one USD file, and as URDF files with places.
+
+A folder of a scene holds ``objects/NAME`` with the files of each object (:func:`artsim.export.export`), ``scene.xml``
+for MuJoCo, with the joint states of the scene as the keyframe ``scene``, ``scene.usda``, which places the objects' USD
+files at rest, and ``scene.json``: for each object its URDF file, ``T_world_object``, joint states, and the joints that
+would meet another object somewhere in their range. The support is the plane z = 0. Distractors are left out.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from lxml import etree
+
+from artsim.common.extras import import_mujoco, require_extra
+from artsim.common.files import read_json, write_atomic
+from artsim.common.names import unused_name
+from artsim.errors import ConfigError
+from artsim.export import FORMATS, export, prepare
+from artsim.export.options import Base, ExportOptions
+from artsim.export.text import numbers
+from artsim.model.draws import joint_intervals
+from artsim.model.kinematics import Array
+from artsim.model.robot import as_robot
+from artsim.renderers.scene import Scene, Thing
+
+_STEPS = 9
+"""States over each joint's range in which it must be free of other objects."""
+_NAMES = ("name", "mesh", "material", "texture", "joint", "joint1", "joint2", "body1", "body2")
+_FILES = ("mesh", "texture")
+_MAX_BYTES = 64_000_000
+_MEETING = -1e-3
+"""Metres: what crosses less only touches."""
+
+
+@dataclass(frozen=True)
+class SceneFiles:
+    """What was written of a scene.
+
+    Attributes
+    ----------
+    folder : Path
+    names : tuple of str
+        Of the objects.
+    blocked : tuple of str
+        ``NAME/JOINT`` of joints that would meet another object somewhere in their range.
+    """
+
+    folder: Path
+    names: tuple[str, ...]
+    blocked: tuple[str, ...]
+
+
+def write_simulation(
+    scene: Scene, folder: Path, base: Base = "fixed", recipe: Mapping[str, Any] | None = None
+) -> SceneFiles:
+    """Write a scene's articulated objects so that simulators load them with all joints free.
+
+    Parameters
+    ----------
+    scene : Scene
+    folder : path
+        Made if missing.
+    base : Base
+        Whether roots are ``fixed`` where they stand, or ``free`` to be pushed (MJCF and USD).
+    recipe : mapping, optional
+        What the scene follows from, in JSON's terms. A folder that was written by the same is left alone.
+
+    Raises
+    ------
+    AssetError
+        When an object lacks what physics needs.
+    ConfigError
+        When MuJoCo or usd-core is not installed.
+    """
+    found = _written(folder)
+    if recipe is not None and found is not None and found.get("recipe") == recipe:
+        return SceneFiles(folder, tuple(own["name"] for own in found["objects"]), tuple(found["blocked"]))
+    things = [_with_bodies(thing) for thing in scene.instances]
+    names = tuple(f"{thing.obj.category or 'object'}_{number}" for number, thing in enumerate(things))
+    for name, thing in zip(names, things, strict=True):
+        export(thing.obj, folder / "objects" / name, ("urdf", "mjcf", "usd"), options=ExportOptions(base))
+    write_atomic(folder / "scene.xml", _mjcf(folder, names, things))
+    _add_keyframe(folder / "scene.xml", names, things)
+    write_atomic(folder / "scene.usda", _usd(folder, names, things, base).encode())
+    blocked = _blocked(folder / "scene.xml", names, things)
+    record = [
+        {
+            "name": name, "category": thing.obj.category, "object_id": thing.obj.object_id,
+            "urdf": f"objects/{name}/{FORMATS['urdf']}", "T_world_object": thing.T_world_object.tolist(),
+            "joints": as_robot(thing.obj).states(thing.q),
+        }
+        for name, thing in zip(names, things, strict=True)
+    ]  # fmt: skip
+    content = {"recipe": recipe, "objects": record, "blocked": blocked}
+    write_atomic(folder / "scene.json", (json.dumps(content, indent=1) + "\n").encode())
+    return SceneFiles(folder, names, tuple(blocked))
+
+
+def _with_bodies(thing: Thing) -> Thing:
+    """An object of a file gets what physics needs, and stands at rest at q = 0."""
+    if all(part.body is not None for part in thing.obj.parts) and not thing.obj.tree.rest.any():
+        return thing
+    return replace(thing, obj=prepare(thing.obj, progress=False), q=thing.q - thing.obj.tree.rest)
+
+
+def _mjcf(folder: Path, names: Sequence[str], things: Sequence[Thing]) -> bytes:
+    """The objects' MJCF files in one: names get that of the object before them."""
+    root = etree.Element("mujoco", model="scene")
+    sections = {tag: etree.Element(tag) for tag in ("asset", "worldbody", "contact", "equality")}
+    for name, thing in zip(names, things, strict=True):
+        own = etree.fromstring((folder / "objects" / name / FORMATS["mjcf"]).read_bytes())
+        if not len(root):
+            root.extend([own.find("option"), own.find("compiler"), own.find("default")])
+            root.find("compiler").attrib.pop("meshdir")
+        for element in own.iter():
+            for key in _NAMES:
+                if key in element.attrib:
+                    element.set(key, f"{name}/{element.get(key)}")
+            if element.tag in _FILES and "file" in element.attrib:
+                element.set("file", f"objects/{name}/meshes/{Path(element.get('file')).name}")
+        body = own.find("worldbody/body")
+        position = thing.T_world_object @ [*map(float, body.get("pos").split()), 1.0]
+        body.set("pos", numbers(position[:3]))
+        body.set("quat", numbers(_quaternion(thing.T_world_object[:3, :3])))
+        for tag, section in sections.items():
+            found = own.find(tag)
+            section.extend(list(found) if found is not None else [])
+    etree.SubElement(sections["worldbody"], "geom", name="support", type="plane", size="0 0 1")
+    etree.SubElement(sections["worldbody"], "light", pos="0 0 4", directional="true")
+    root.extend(sections.values())
+    text: bytes = etree.tostring(root, pretty_print=True)
+    return text
+
+
+def _add_keyframe(path: Path, names: Sequence[str], things: Sequence[Thing]) -> None:
+    """The states of the scene, in MuJoCo's order."""
+    mujoco = import_mujoco("MJCF files")
+
+    model = mujoco.MjModel.from_xml_path(str(path))
+    qpos = model.qpos0.copy()
+    for name, thing in zip(names, things, strict=True):
+        for joint, value in as_robot(thing.obj).states(thing.q).items():
+            qpos[model.joint(f"{name}/{joint}").qposadr[0]] = value
+    root = etree.fromstring(path.read_bytes())
+    etree.SubElement(etree.SubElement(root, "keyframe"), "key", name="scene", qpos=numbers(qpos))
+    write_atomic(path, etree.tostring(root, pretty_print=True))
+
+
+def _blocked(path: Path, names: Sequence[str], things: Sequence[Thing]) -> list[str]:
+    """Joints that meet another object, all others being where they are in the scene."""
+    mujoco = import_mujoco("MJCF files")
+
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    owner = model.body_rootid[model.geom_bodyid]
+    support = model.geom("support").id
+    found = []
+    for name, thing in zip(names, things, strict=True):
+        tree, intervals = thing.obj.tree, joint_intervals(thing.obj)
+        for k in tree.free_joints:
+            for value in np.linspace(intervals[k, 0], intervals[k, 1], _STEPS):
+                q = thing.q.copy()
+                q[k] = value
+                mujoco.mj_resetDataKeyframe(model, data, 0)
+                for joint, state in as_robot(thing.obj).states(q).items():
+                    data.qpos[model.joint(f"{name}/{joint}").qposadr[0]] = state
+                mujoco.mj_forward(model, data)
+                pairs = [contact.geom for contact in data.contact if contact.dist < _MEETING]
+                root = model.body_rootid[model.body(f"{name}/{thing.obj.parts[0].name}").id]
+                apart = [owner[pair] for pair in pairs if support not in pair]
+                if any(pair[0] != pair[1] and root in pair for pair in apart):
+                    found.append(f"{name}/{tree.joints[k].name}")
+                    break
+    return found
+
+
+def _usd(folder: Path, names: Sequence[str], things: Sequence[Thing], base: str) -> str:
+    """The objects' USD files, each at its place; a fixed base is held there."""
+    with require_extra("USD files"):
+        from pxr import Gf, Usd, UsdGeom, UsdPhysics
+
+    unsaved = folder / ".scene.usda"  # beside what it refers to
+    stage = Usd.Stage.CreateNew(str(unsaved))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
+    world = UsdGeom.Xform.Define(stage, "/World")
+    stage.SetDefaultPrim(world.GetPrim())
+    UsdPhysics.Scene.Define(stage, "/World/physics").CreateGravityDirectionAttr(Gf.Vec3f(0.0, 0.0, -1.0))
+    support = UsdGeom.Plane.Define(stage, "/World/support")
+    support.CreateAxisAttr(UsdGeom.Tokens.z)
+    UsdPhysics.CollisionAPI.Apply(support.GetPrim())
+    for name, thing in zip(names, things, strict=True):
+        T = thing.T_world_object
+        w, x, y, z = _quaternion(T[:3, :3]).tolist()
+        placed = UsdGeom.Xform.Define(stage, f"/World/{name}")
+        placed.GetPrim().GetReferences().AddReference(f"./objects/{name}/{FORMATS['usd']}")
+        placed.AddTranslateOp().Set(Gf.Vec3d(*T[:3, 3].tolist()))
+        placed.AddOrientOp().Set(Gf.Quatf(w, x, y, z))
+        if base == "fixed":  # the world's side of the joint that holds the base
+            word = unused_name("fixed_base", {part.name for part in thing.obj.parts})
+            held = UsdPhysics.FixedJoint(stage.OverridePrim(f"/World/{name}/{word}"))
+            held.CreateLocalPos0Attr(Gf.Vec3f(*T[:3, 3].tolist()))
+            held.CreateLocalRot0Attr(Gf.Quatf(w, x, y, z))
+    text: str = stage.GetRootLayer().ExportToString()
+    unsaved.unlink()
+    return text
+
+
+def _quaternion(rotation: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(rotation).as_quat()
+    return np.array([w, x, y, z])
+
+
+def _written(folder: Path) -> dict[str, Any] | None:
+    """The record of a scene that is there whole."""
+    path = folder / "scene.json"
+    found = read_json(path, "the record of a scene", ConfigError, _MAX_BYTES) if path.is_file() else None
+    return found if isinstance(found, dict) else None
