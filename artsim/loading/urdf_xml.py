@@ -23,8 +23,8 @@ from artsim.model.objects import Repair
 SHAPES = ("box", "cylinder", "capsule", "sphere", "mesh")
 
 
-def safe_xml(data: bytes, where: Path) -> etree._Element:
-    """Parse XML without entities, document types, network or huge nodes.
+def safe_xml(data: bytes, where: Path, huge_tree: bool = False) -> etree._Element:
+    """Parse XML without entities, document types, network or, unless they are allowed, huge nodes.
 
     Raises
     ------
@@ -34,11 +34,16 @@ def safe_xml(data: bytes, where: Path) -> etree._Element:
     if not data.strip():
         raise AssetError("the file is empty", where, "write or download it again")
     parser = etree.XMLParser(
-        resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False, remove_comments=True, remove_pis=True
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        huge_tree=huge_tree,
+        remove_comments=True,
+        remove_pis=True,
     )
     try:
         root = etree.fromstring(data, parser)
-    except (etree.XMLSyntaxError, ValueError) as error:
+    except (etree.XMLSyntaxError, ValueError, LookupError) as error:
         raise AssetError(f"not well-formed XML ({error})", where, "correct the element at that line") from error
     if root.getroottree().docinfo.doctype:
         raise AssetError("declares a document type, which could hide entities", where, "remove the <!DOCTYPE ...>")

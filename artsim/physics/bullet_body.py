@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from artsim.common.extras import import_pybullet, silence_output
+from artsim.loading.primitives import box
 from artsim.model.kinematics import Array
 from artsim.model.robot import BoxShape, Link, MeshShape, Robot
 from artsim.physics.options import PhysicsOptions
@@ -159,10 +160,8 @@ def _collision_shape(bullet: ModuleType, client: int, link: Link) -> int:
 
 
 def _box_mesh(shape: BoxShape) -> MeshShape:
-    import trimesh
-
-    box = trimesh.creation.box(shape.size)
-    return MeshShape("box", np.asarray(box.vertices) + shape.center, np.asarray(box.faces, dtype=np.int32))
+    vertices, faces = box(shape.size)
+    return MeshShape("box", vertices + shape.center, faces)
 
 
 def _disconnect(bullet: ModuleType, client: int) -> None:

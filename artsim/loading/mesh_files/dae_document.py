@@ -8,6 +8,7 @@ from lxml import etree
 from artsim.errors import AssetError
 from artsim.loading.mesh_files.surface import Array, Bounds, UnusableMeshError, quote_name
 from artsim.loading.mesh_files.text import numbers
+from artsim.loading.urdf_xml import safe_xml
 
 _MAX_TAGS = 600_000
 """An element has two tags, and takes some 200 bytes of memory and two microseconds."""
@@ -71,21 +72,12 @@ def _parse(data: bytes, bounds: Bounds) -> etree._Element:
         raise AssetError("declares a document type, which could hide entities", bounds.where, "remove the <!DOCTYPE>")
     declaration = data[: data.find(b"?>")] if data[:100].lstrip().startswith(b"<?xml") else b""
     plain = plain and b"utf-16" not in declaration.lower() and b"utf-7" not in declaration.lower()
-    parser = etree.XMLParser(
-        resolve_entities=False,
-        no_network=True,
-        load_dtd=False,
-        huge_tree=plain,
-        remove_comments=True,
-        remove_pis=True,
-    )
     try:
-        root = etree.fromstring(data.lstrip(b" \t\r\n"), parser)
-    except (etree.XMLSyntaxError, ValueError, LookupError) as error:
-        raise UnusableMeshError(f"is not well-formed XML ({error})") from error
-    if root.getroottree().docinfo.doctype:
-        raise AssetError("declares a document type, which could hide entities", bounds.where, "remove the <!DOCTYPE>")
-    return root
+        return safe_xml(data.lstrip(b" \t\r\n"), bounds.where, huge_tree=plain)
+    except AssetError as error:
+        if error.__cause__ is None and data.strip():
+            raise
+        raise UnusableMeshError(f"is not well-formed XML ({error.__cause__ or 'it is empty'})") from error
 
 
 def attribute(element: etree._Element) -> str:
