@@ -17,18 +17,7 @@ _MAX_TAGS = 600_000
 class Document:
     """A COLLADA document whose tags have no namespace.
 
-    Attributes
-    ----------
-    root : lxml element
-    points : dict
-        Positions of each source that was read.
-    num_primitives : int
-        Primitives that were read.
-
-    Parameters
-    ----------
-    data : bytes
-    bounds : Bounds
+    ``points`` are the positions of each source that was read, and ``num_primitives`` counts the primitives.
 
     Raises
     ------
