@@ -101,30 +101,7 @@ def labels_by_boxes(
     sigma : float
         Metres that weigh as much as odds of 1 to e.
     """
-    given = (points, T_camera_part, center, 0.5 * size, log_odds)
-    own, T, middle, half, prior = (np.ascontiguousarray(values, dtype=np.float64) for values in given)
-    return _likeliest_boxes(own, T, middle, half, prior, sigma)
-
-
-@compiled
-def _likeliest_boxes(
-    points: Array, T_camera_part: Array, center: Array, half: Array, log_odds: Array, sigma: float
-) -> NDArray[np.int64]:
-    """See :func:`labels_by_boxes`; log-odds are those of :func:`label_log_odds`."""
-    label = np.empty(len(points), dtype=np.int64)
-    for n in range(len(points)):
-        best, label[n] = -np.inf, 0
-        for k in range(len(center)):
-            squared = 0.0
-            for i in range(3):
-                place = -center[k, i]
-                for x in range(3):
-                    place += (points[n, x] - T_camera_part[k, x, 3]) * T_camera_part[k, x, i]
-                squared += max(abs(place) - half[k, i], 0.0) ** 2
-            score = log_odds[n, k] - squared / (sigma * sigma)
-            if np.isnan(score):
-                label[n] = -1
-                break
-            if score > best:
-                best, label[n] = score, k
-    return label
+    places = (points - T_camera_part[:, None, :3, 3]) @ T_camera_part[:, :3, :3]
+    beyond = np.maximum(np.abs(places - center[:, None]) - 0.5 * size[:, None], 0.0)
+    score = label_log_odds(log_odds[:, : len(center)], np.sqrt((beyond**2).sum(axis=-1)).T, sigma)
+    return np.where(np.isnan(score).any(axis=1), -1, score.argmax(axis=1))

@@ -21,7 +21,7 @@ import torch
 from torch import Tensor, nn
 from typing_extensions import ParamSpec
 
-from artperl.core.edge_kernels import Interpolated, Strongest, StrongestByGathering
+from artperl.core.edge_kernels import Strongest, StrongestByGathering
 from artperl.core.neighbours import nearest_points
 
 P = ParamSpec("P")
@@ -96,8 +96,8 @@ def interpolate(features: Tensor, weight: Tensor, index: Tensor) -> Tensor:
     if features.is_cuda:  # a product with a dense matrix is faster backwards
         return weight.new_zeros(*weight.shape[:2], features.shape[1]).scatter_(2, index, weight) @ features
     every, flat = _flat(features, index)
-    total = Interpolated.apply(every, weight.flatten(0, 1), flat)  # type: ignore[no-untyped-call]
-    return total.reshape(*index.shape[:2], -1)
+    total = (every[flat] * weight.flatten(0, 1)[..., None]).sum(1)
+    return total.to(features.dtype).reshape(*index.shape[:2], -1)
 
 
 def _flat(features: Tensor, index: Tensor) -> tuple[Tensor, Tensor]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from artperl.core.pose import Theta
@@ -17,7 +18,7 @@ from artperl.fitting.arrays import Array, Reference, State, Tree, View, referenc
 from artperl.fitting.columns import Columns
 from artperl.fitting.correspondence import Target
 from artperl.fitting.damping import DAMPING, DAMPING_FALL, DAMPING_RISE, LEAST_DAMPING, MOST_DAMPING, RIGID_ITERATIONS
-from artperl.fitting.match_loops import match, robust_mean, rotation_of_vector
+from artperl.fitting.match_loops import Rows, match, robust_sum
 from artperl.fitting.refine_options import RefineOptions
 from artperl.fitting.shape_prior import ShapePrior
 from artperl.fitting.step_loops import damped_step, normal_equations
@@ -54,13 +55,12 @@ class _Problem:
         """The tree with axes that lean by rotation vectors (P, 3)."""
         if not lean.any():
             return self.tree
-        axes = [rotation_of_vector(own) @ axis for own, axis in zip(lean, self.tree.axis, strict=True)]
-        return self.tree._replace(axis=np.stack(axes))
+        return self.tree._replace(axis=Rotation.from_rotvec(lean).apply(self.tree.axis))
 
     def retract(self, state: State, lean: Array, step: Array) -> tuple[State, Array]:
         """State and lean after a step (D,), columns as :class:`Columns`; states stay within their limits."""
         columns, pivot = self.columns, self.view.middle
-        turn = rotation_of_vector(step[:3])
+        turn = Rotation.from_rotvec(step[:3]).as_matrix()
         limited = np.clip(state.state + step[columns.state], self.tree.lower, self.tree.upper)
         after = State(
             turn @ state.rotation, turn @ (state.translation - pivot) + pivot + step[3:6],
@@ -76,7 +76,7 @@ class _Problem:
         outline, tree = options.outline_weight, self.tree
         posed, rows = match(tree, self.shape, self.view, start, outline)
         cost = self.cost(start, lean)
-        first = energy = robust_mean(rows, options.robust_end) + cost
+        first = energy = _robust_mean(rows, options.robust_end) + cost
         damping, steps, width, equations = DAMPING, 0, options.robust_start, None
         leans = len(self.active) > self.columns.shift.stop
         for i in range(options.iterations):
@@ -93,7 +93,7 @@ class _Problem:
             new_tree = self.leaning(new_lean)
             new_posed, new_rows = match(new_tree, self.shape, self.view, state, outline)
             new_cost = self.cost(state, new_lean)
-            before, after = robust_mean(rows, width) + cost, robust_mean(new_rows, width) + new_cost
+            before, after = _robust_mean(rows, width) + cost, _robust_mean(new_rows, width) + new_cost
             better = after < before
             if better:
                 current, lean, tree, posed, rows, cost = state, new_lean, new_tree, new_posed, new_rows, new_cost
@@ -107,11 +107,15 @@ class _Problem:
                 equations = None  # they are of another state, of other weights or of fewer parameters
             if settled and decrease < options.tolerance * before:
                 break
-        energy = robust_mean(rows, options.robust_end) + cost
+        energy = _robust_mean(rows, options.robust_end) + cost
         # Steps that lowered the energy of a wider kernel need not have lowered that of the last one.
         if energy < first:
             return current, lean, energy, first, steps
         return start, np.zeros_like(lean), first, first, steps
+
+
+def _robust_mean(rows: Rows, width: float) -> float:
+    return float(robust_sum(rows, 0, len(rows.weight), width))
 
 
 def refine_each(

@@ -140,18 +140,6 @@ def rotate_about(axis: Array, angle: float, out: Array) -> None:
 
 
 @compiled
-def rotation_of_vector(vector: Array) -> Array:
-    """(3, 3) rotation by the length of a vector (3,), radians, about it."""
-    out, axis = np.eye(3), np.empty(3)
-    angle = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
-    if angle > 0.0:
-        for i in range(3):
-            axis[i] = vector[i] / angle
-        rotate_about(axis, angle, out)
-    return out
-
-
-@compiled
 def match(tree: Tree, shape: Reference, view: View, state: State, outline_weight: float) -> tuple[Posed, Rows]:
     """See :func:`artperl.fitting.correspondence.match`."""
     posed = pose(tree, shape.box_center, state)
@@ -333,13 +321,8 @@ def _match_outline(shape: Reference, view: View, points: Array, few: int, outlin
 
 
 @compiled
-def robust_mean(rows: Rows, width: float) -> float:
-    """See :func:`artperl.fitting.levenberg_marquardt.robust_mean`."""
-    return _robust_sum(rows, 0, len(rows.weight), width)
-
-
-@compiled
-def _robust_sum(rows: Rows, begin: int, end: int, width: float) -> float:
+def robust_sum(rows: Rows, begin: int, end: int, width: float) -> float:
+    """Robust squared distances, weighted, of some rows: see :mod:`artperl.fitting.levenberg_marquardt`."""
     total, wide = 0.0, width * width
     for r in range(begin, end):
         square = rows.residual[r, 0] ** 2 + (TANGENT_WEIGHT * rows.residual[r, 1]) ** 2
@@ -388,14 +371,14 @@ def misfits(
         for begin in range(0, N, _LOOK):
             end = min(begin + _LOOK, N)
             _match_surface(shape, view, posed, points, normals, discs, rows, begin, end)
-            own += _robust_sum(rows, begin, end, width)
+            own += robust_sum(rows, begin, end, width)
             if own >= worst:
                 break
         if own >= worst:
             continue
         if few > 0:
             _match_outline(shape, view, points, few, outline_weight, rows)
-            own += _robust_sum(rows, N, R, width)
+            own += robust_sum(rows, N, R, width)
         if own < worst:
             total[b] = own
             at = keep - 1

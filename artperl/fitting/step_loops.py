@@ -1,4 +1,4 @@
-"""Compiled normal equations of the reweighted least squares of one object, and their damped steps, in double precision.
+"""Normal equations of the reweighted least squares of one object, and their damped steps, in double precision.
 
 A part moves rigidly and grows about its box centre, whatever the tree. So the Jacobian is a product of two factors: how
 a residual changes with the turn about the middle of the cloud (3), motion (3) and growth (3) of its part, and how these
@@ -38,7 +38,6 @@ class Equations(NamedTuple):
     columns: Indices
 
 
-@compiled
 def normal_equations(
     tree: Tree, shape: Reference, view: View, state: State, posed: Posed, rows: Rows, deviations: Array,
     precision: Array, columns: Indices, width: float, rigid: bool, leans: bool,
@@ -52,48 +51,19 @@ def normal_equations(
     columns : (d,) int64
         Of these, those that move.
     """
-    P, d = len(tree.parent), len(columns)
+    size, P = 6 if rigid else 9, len(tree.parent)
     squares, pulls = _sums(shape, view, posed, rows, P, width)
-    curvature, gradient = np.zeros((d, d)), np.zeros(d)
-    for a in range(d):
-        for b in range(d):
-            curvature[a, b] = precision[columns[a], columns[b]]
-            gradient[a] += precision[columns[a], columns[b]] * deviations[columns[b]]
-    seen = np.zeros(P, dtype=np.bool_)
-    for r in range(len(rows.weight)):
-        if rows.weight[r] > 0.0:
-            seen[rows.part[r]] = True
-    size = 6 if rigid else 9
-    rates, own, product = np.empty((9, len(deviations))), np.empty((size, d)), np.empty((size, d))
-    for k in range(P):
-        if not seen[k]:
-            continue
-        _part_rates(tree, shape, view, state, posed, k, rigid, leans, rates)
-        for i in range(size):
-            for a in range(d):
-                own[i, a] = rates[i, columns[a]] / view.unit
-        for i in range(size):
-            for a in range(d):
-                product[i, a] = 0.0
-            for j in range(size):
-                for a in range(d):
-                    product[i, a] += squares[k, i, j] * own[j, a]
-        for i in range(size):
-            for a in range(d):
-                if own[i, a] != 0.0:
-                    gradient[a] += own[i, a] * pulls[k, i]
-                    for b in range(d):
-                        curvature[a, b] += own[i, a] * product[i, b]
-    free = np.ones(d, dtype=np.bool_)
-    for a in range(d):
-        k = columns[a] - 6
-        if 0 <= k < P:
-            held = state.state[k] <= tree.lower[k] and gradient[a] > 0.0
-            free[a] = not (held or (state.state[k] >= tree.upper[k] and gradient[a] < 0.0))
-    for a in range(d):
-        for b in range(d):
-            if not (free[a] and free[b]):
-                curvature[a, b] = 0.0
+    rates = _part_rates(tree, shape, view, state, posed, rigid, leans, len(deviations))[:, :size, columns] / view.unit
+    own = precision[np.ix_(columns, columns)]
+    curvature = own + np.tensordot(rates, squares[:, :size, :size] @ rates, axes=([0, 1], [0, 1]))
+    gradient = own @ deviations[columns] + np.tensordot(pulls[:, :size], rates)
+    joint = columns - 6
+    moves = (joint >= 0) & (joint < P)
+    joint = np.where(moves, joint, 0)
+    low, high = state.state[joint] <= tree.lower[joint], state.state[joint] >= tree.upper[joint]
+    free = ~(moves & ((low & (gradient > 0.0)) | (high & (gradient < 0.0))))
+    curvature[~free] = 0.0
+    curvature[:, ~free] = 0.0
     return Equations(curvature, gradient, free, columns)
 
 
@@ -139,63 +109,64 @@ def _sums(shape: Reference, view: View, posed: Posed, rows: Rows, P: int, width:
 
 @compiled
 def _part_rates(
-    tree: Tree, shape: Reference, view: View, state: State, posed: Posed, k: int, rigid: bool, leans: bool, rates: Array
-) -> None:
-    """Derivatives of the motion and growth of part k by the parameters, into (9, D).
+    tree: Tree, shape: Reference, view: View, state: State, posed: Posed, rigid: bool, leans: bool, count: int
+) -> Array:
+    """(P, 9, D) derivatives of the motion and growth of each part by the parameters, so many.
 
     The moment about a joint's axis is that about the middle less the direction's own about the axis (Pluecker).
     """
     P = len(tree.parent)
-    rates[:] = 0.0
-    for i in range(6):
-        rates[i, i] = 1.0
-    axis, arm = np.empty(3), np.empty(3)
-    if not rigid:
-        for i in range(3):
-            center = np.exp(state.log_scale[i]) * shape.box_center[k, i]
-            for x in range(3):
-                rates[3 + x, 6 + P + i] = posed.rotation[k, x, i] * center
-            rates[6 + i, 6 + P + i] = 1.0
-            rates[6 + i, 9 + P + 3 * k + i] = 1.0
-    for j in range(P):
-        if not tree.carries[j, k]:
-            continue
-        above, turn = posed.above[j], tree.turn[j]
-        for x in range(3):
-            axis[x], arm[x] = 0.0, posed.anchor[j, x] - view.middle[x]
+    every, axis, arm = np.zeros((P, 9, count)), np.empty(3), np.empty(3)
+    for k in range(P):
+        rates = every[k]
+        for i in range(6):
+            rates[i, i] = 1.0
+        if not rigid:
             for i in range(3):
-                axis[x] += above[x, i] * tree.axis[j, i]
-                arm[x] += above[x, i] * posed.origin[j, i]
-        column, factor = 6 + tree.source[j], tree.multiplier[j]
-        slide = tree.slide[j] * posed.reach[j]
-        for x in range(3):
-            y, z = (x + 1) % 3, (x + 2) % 3
-            rates[x, column] += factor * turn * axis[x]
-            rates[3 + x, column] += factor * (slide * axis[x] - turn * (axis[y] * arm[z] - axis[z] * arm[y]))
-        if rigid:
-            continue
-        value = tree.rest[j] + tree.offset[j]
-        if tree.multiplier[j] != 0.0:
-            value = tree.multiplier[j] * state.state[tree.source[j]] + tree.offset[j]
-        step = (value - tree.rest[j]) * tree.slide[j]
-        for i in range(3):
-            whole = np.exp(state.log_scale[i])
-            longer = step * (whole * tree.axis[j, i]) ** 2 / posed.reach[j]
+                center = np.exp(state.log_scale[i]) * shape.box_center[k, i]
+                for x in range(3):
+                    rates[3 + x, 6 + P + i] = posed.rotation[k, x, i] * center
+                rates[6 + i, 6 + P + i] = 1.0
+                rates[6 + i, 9 + P + 3 * k + i] = 1.0
+        for j in range(P):
+            if not tree.carries[j, k]:
+                continue
+            above, turn = posed.above[j], tree.turn[j]
             for x in range(3):
-                anchor = (above[x, i] - posed.rotation[j, x, i]) * whole * tree.origin[j, i]
-                rates[3 + x, 6 + P + i] += anchor + axis[x] * longer
-                rates[3 + x, 9 + 4 * P + 3 * j + i] = above[x, i]
-        if leans:
+                axis[x], arm[x] = 0.0, posed.anchor[j, x] - view.middle[x]
+                for i in range(3):
+                    axis[x] += above[x, i] * tree.axis[j, i]
+                    arm[x] += above[x, i] * posed.origin[j, i]
+            column, factor = 6 + tree.source[j], tree.multiplier[j]
+            slide = tree.slide[j] * posed.reach[j]
+            for x in range(3):
+                y, z = (x + 1) % 3, (x + 2) % 3
+                rates[x, column] += factor * turn * axis[x]
+                rates[3 + x, column] += factor * (slide * axis[x] - turn * (axis[y] * arm[z] - axis[z] * arm[y]))
+            if rigid:
+                continue
+            value = tree.rest[j] + tree.offset[j]
+            if tree.multiplier[j] != 0.0:
+                value = tree.multiplier[j] * state.state[tree.source[j]] + tree.offset[j]
+            step = (value - tree.rest[j]) * tree.slide[j]
             for i in range(3):
-                column = 9 + 7 * P + 3 * j + i
+                whole = np.exp(state.log_scale[i])
+                longer = step * (whole * tree.axis[j, i]) ** 2 / posed.reach[j]
                 for x in range(3):
-                    rates[x, column] = turn * (above[x, i] - posed.rotation[j, x, i])
-                for x in range(3):
-                    y, z = (x + 1) % 3, (x + 2) % 3
-                    rates[3 + x, column] = rates[z, column] * arm[y] - rates[y, column] * arm[z]
+                    anchor = (above[x, i] - posed.rotation[j, x, i]) * whole * tree.origin[j, i]
+                    rates[3 + x, 6 + P + i] += anchor + axis[x] * longer
+                    rates[3 + x, 9 + 4 * P + 3 * j + i] = above[x, i]
+            if leans:
+                for i in range(3):
+                    column = 9 + 7 * P + 3 * j + i
+                    for x in range(3):
+                        rates[x, column] = turn * (above[x, i] - posed.rotation[j, x, i])
+                    for x in range(3):
+                        y, z = (x + 1) % 3, (x + 2) % 3
+                        rates[3 + x, column] = rates[z, column] * arm[y] - rates[y, column] * arm[z]
+    return every
 
 
-@compiled
 def damped_step(equations: Equations, damping: float, count: int, total: int) -> tuple[Array, float]:
     """Damped step after Marquardt 1963, and by how much the energy would fall if every point kept its match.
 
@@ -206,35 +177,9 @@ def damped_step(equations: Equations, damping: float, count: int, total: int) ->
     total : int
         Length of the step.
     """
-    d = len(equations.columns)
-    mean = 0.0
-    for a in range(d):
-        mean += equations.curvature[a, a]
-    floor = 1e-6 * mean / count + 1e-30
-    lower, step = np.zeros((d, d)), np.empty(d)
-    for a in range(d):  # Cholesky's factor
-        for b in range(a + 1):
-            value = equations.curvature[a, b]
-            if a == b:
-                value += damping * value + floor + (0.0 if equations.free[a] else 1.0)
-            for c in range(b):
-                value -= lower[a, c] * lower[b, c]
-            lower[a, b] = np.sqrt(max(value, 1e-300)) if a == b else value / lower[b, b]
-    for a in range(d):
-        value = -equations.gradient[a] if equations.free[a] else 0.0
-        for c in range(a):
-            value -= lower[a, c] * step[c]
-        step[a] = value / lower[a, a]
-    for a in range(d - 1, -1, -1):
-        value = step[a]
-        for c in range(a + 1, d):
-            value -= lower[c, a] * step[c]
-        step[a] = value / lower[a, a]
-    every, decrease = np.zeros(total), 0.0
-    for a in range(d):
-        every[equations.columns[a]] = step[a]
-        change = 2.0 * equations.gradient[a]
-        for b in range(d):
-            change += equations.curvature[a, b] * step[b]
-        decrease -= step[a] * change
-    return every, decrease
+    curvature, gradient, free, columns = equations
+    diagonal, every = curvature.diagonal(), np.zeros(total)
+    floor = 1e-6 * diagonal.sum() / count + 1e-30
+    step = np.linalg.solve(curvature + np.diag(damping * diagonal + floor + ~free), np.where(free, -gradient, 0.0))
+    every[columns] = step
+    return every, -float(step @ (2.0 * gradient + curvature @ step))

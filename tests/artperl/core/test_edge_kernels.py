@@ -1,4 +1,4 @@
-"""Compiled sums and maxima over neighbours: torch's own operations are the oracle, forwards and backwards."""
+"""Sums and maxima over neighbours: torch's own operations are the oracle, forwards and backwards."""
 
 import pytest
 import torch
@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch.nn import functional
 
-from artperl.core.edge_kernels import Interpolated, Strongest, StrongestByGathering
+from artperl.core.edge_kernels import Strongest, StrongestByGathering
+from artperl.core.pointnet2 import interpolate
 
 
 def _drawn(seed: int, rows: int, queries: int, neighbours: int, channels: int):
@@ -39,7 +40,7 @@ def test_a_maximum_is_that_of_embedding_bag(sizes, kernel):
 @given(SIZES)
 def test_a_weighted_sum_is_that_of_embedding_bag(sizes):
     features, index, weight, upstream = _drawn(*sizes)
-    ours = Interpolated.apply(features, weight, index)
+    ours = interpolate(features[None], weight[None], index[None])[0]
     theirs = functional.embedding_bag(index, features, mode="sum", per_sample_weights=weight)
     torch.testing.assert_close(ours, theirs)
     torch.testing.assert_close(_gradient(ours, features, upstream), _gradient(theirs, features, upstream))
@@ -50,7 +51,7 @@ def test_results_and_gradients_keep_the_precision_of_the_features(dtype):
     features, index, weight, upstream = _drawn(0, 7, 5, 3, 4)
     features = features.detach().to(dtype).requires_grad_()
     kernels = Strongest.apply(features, index), StrongestByGathering.apply(features, index)
-    for result in (*kernels, Interpolated.apply(features, weight, index)):
+    for result in (*kernels, interpolate(features[None], weight[None], index[None])[0]):
         assert result.dtype == dtype
         assert _gradient(result, features, upstream.to(dtype)).dtype == dtype
 
