@@ -26,7 +26,8 @@ from artsim.errors import RenderError
 from artsim.families import make
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute, screw
 from artsim.making.solids import box, cylinder, ring
-from artsim.model.kinematics import Joint, KinematicTree
+from artsim.model.joints import Joint
+from artsim.model.kinematics import KinematicTree
 from artsim.model.objects import ArticulatedObject, Part
 from artsim.renderers import Renderer, make_renderer
 from tests.processors import PROCESSORS, can_run, left_out

@@ -151,7 +151,7 @@ MODULES = {
     "families": sorted(path.stem for path in (ROOT / "families").glob("*.py")),
     "loading": ("bodies", "joint_xml", "meshes", "primitives", "rest_state", "xml_values"),
     "making": ("assembly", "outlines", "solids"),
-    "model": ("camera", "draws", "kinematics", "objects", "transforms"),
+    "model": ("camera", "draws", "joints", "kinematics", "objects", "transforms"),
     "observing": ("capture", "noise", "sample", "sensor"),
     "renderers": ("outlines", "ray_kernels", "raycast", "scene", "view_batch"),
     "scenes": ("placement", "props", "random_scene"),

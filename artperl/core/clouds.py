@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from artperl.core.batch import Batch
-from artsim.model.kinematics import ROTATING, Array
+from artsim.model.joints import ROTATING
+from artsim.model.kinematics import Array
 
 _FARTHEST = 1e9
 """Coordinates beyond stand for no measurement, as the largest float does for some sensors; squares of them overflow."""

@@ -13,7 +13,8 @@ from torch import Tensor
 from artperl.core.batch import Batch
 from artperl.core.trees import Trees
 from artsim.errors import ConfigError
-from artsim.model.kinematics import Array, Joint, KinematicTree
+from artsim.model.joints import Joint
+from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import ArticulatedObject
 
 

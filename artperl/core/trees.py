@@ -11,7 +11,8 @@ from torch import Tensor
 
 from artperl.core.batch import Batch
 from artsim.errors import KinematicsError
-from artsim.model.kinematics import JOINT_TYPES, ROTATING, KinematicTree
+from artsim.model.joints import JOINT_TYPES, ROTATING
+from artsim.model.kinematics import KinematicTree
 
 KINDS = (*JOINT_TYPES, "fixed")
 """Kinds of joints by number. Rows that pad a tree are fixed to the root."""

@@ -11,7 +11,8 @@ from torch import Tensor
 from artperl.core.shapes import Shapes
 from artperl.core.trees import Trees
 from artperl.retrieval.shape_base import ShapeBase
-from artsim.model.kinematics import Joint, KinematicTree
+from artsim.model.joints import Joint
+from artsim.model.kinematics import KinematicTree
 
 _PIVOT = 2.0
 """What a difference of one diagonal in the place of an axis counts for against one of 1 in its direction."""

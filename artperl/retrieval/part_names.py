@@ -14,7 +14,7 @@ from artperl.core.trees import KINDS
 from artperl.retrieval.shape_base import ShapeBase
 from artsim.errors import ArtsimError
 from artsim.families import FAMILIES, make
-from artsim.model.kinematics import Joint
+from artsim.model.joints import Joint
 
 _FITTED = 0.25
 """Difference of boxes, in diagonals, up to which a part is that of the reference as a fit has stretched it."""

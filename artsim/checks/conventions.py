@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from artsim.model.kinematics import Array, Joint
+from artsim.model.joints import Joint
+from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 
 _ALONG = np.cos(np.deg2rad(25.0))

@@ -14,7 +14,6 @@ import numpy as np
 from artsim.common.sharding import Shared, process_rank
 from artsim.datasets.description import read_description
 from artsim.datasets.object_cache import ObjectCache
-from artsim.datasets.padding import PaddedDataset, PaddedStream
 from artsim.datasets.plan import Plan, PlannedObject, ShardRecord
 from artsim.datasets.problems import repair_command
 from artsim.datasets.sample_options import DrawnStream
@@ -23,6 +22,7 @@ from artsim.datasets.splits import SPLITS
 from artsim.datasets.summary import summary
 from artsim.errors import ConfigError, DatasetError
 from artsim.model.objects import ArticulatedObject
+from artsim.observing.padding import PaddedDataset, PaddedStream
 from artsim.observing.sample import Sample
 from artsim.runs.storage import FolderStorage, Place, storage_of
 

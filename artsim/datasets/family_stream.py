@@ -8,13 +8,13 @@ from functools import lru_cache
 import numpy as np
 
 from artsim.common.sequences import listed
-from artsim.datasets.padding import PaddedStream
 from artsim.datasets.sample_options import DrawnStream, SampleOptions
 from artsim.errors import ConfigError
 from artsim.families import assembly_of
 from artsim.loading.sources import family_sources
 from artsim.making.assembly import Assembly
 from artsim.model.objects import ArticulatedObject
+from artsim.observing.padding import PaddedStream
 
 __all__ = ["FamilyStream"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from artsim.common.names import printable
-from artsim.model.kinematics import Joint
+from artsim.model.joints import Joint
 from artsim.model.objects import ArticulatedObject
 
 

@@ -27,7 +27,8 @@ from artsim.drawing.contact_sheet import spread
 from artsim.errors import ArtsimError
 from artsim.loading.urdf import load
 from artsim.model.draws import joint_intervals
-from artsim.model.kinematics import ROTATING, Array, KinematicTree
+from artsim.model.joints import ROTATING
+from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.annotation import axis_segment
 from artsim.observing.sample import Sample

@@ -22,11 +22,11 @@ from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import ArrayLike, NDArray
 
-from artsim.datasets.padding import pad_sample
 from artsim.errors import ConfigError
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.annotation import shade_parts
+from artsim.observing.padding import pad_sample
 from artsim.observing.sample import Sample
 from artsim.physics.episode import Episode, EpisodeOptions, openness
 from artsim.physics.options import Control
@@ -98,7 +98,7 @@ class ArticulatedEnv(gymnasium.Env[Observation, Any]):
     share of its effort limit, or, under velocity control, of its velocity limit. Further entries move nothing. An
     **observation** holds ``points`` (N, 3), the partial cloud in the camera frame in metres, and the images asked for:
     ``depth`` (H, W) in metres, 0 = no return, ``part_mask`` (H, W), 255 = background. The **info** is the whole ground
-    truth: the record as :func:`artsim.datasets.padding.pad_sample` writes it, with P = ``max_joints + 1`` rows, and
+    truth: the record as :func:`artsim.observing.padding.pad_sample` writes it, with P = ``max_joints + 1`` rows, and
 
     - ``time``: seconds since the episode began,
     - ``joint_velocity`` (P,): rad/s or m/s,

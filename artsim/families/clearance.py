@@ -12,7 +12,8 @@ from artsim.common.products import dot, matmul, norm, unit
 from artsim.making.assembly import JointSpec, Rng
 from artsim.making.outlines import Vector
 from artsim.making.solids import Solid, cylinder
-from artsim.model.kinematics import Array, Joint, KinematicTree
+from artsim.model.joints import Joint
+from artsim.model.kinematics import Array, KinematicTree
 
 Index = NDArray[np.int64]
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.errors import ConfigError
-from artsim.model.kinematics import JOINT_TYPES
+from artsim.model.joints import JOINT_TYPES
 from artsim.model.objects import ArticulatedObject
 
 Interval = tuple[float, float]

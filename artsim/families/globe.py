@@ -13,8 +13,9 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.common.products import apply, unit
 from artsim.making.assembly import Assembly, Rng, continuous, revolute
-from artsim.making.outlines import UP, rotation_about, turns
+from artsim.making.outlines import UP, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, revolved, ring, rod, tube, union
+from artsim.model.transforms import rotation_about
 
 GAP = 0.0015
 

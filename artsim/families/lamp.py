@@ -16,9 +16,10 @@ from artsim.common.products import apply
 from artsim.families.clearance import Link, narrow_limits
 from artsim.families.standing_lamp import spotlight, standing
 from artsim.making.assembly import Assembly, Rng, continuous, pick, revolute
-from artsim.making.outlines import SIDE, UP, rotation_about
+from artsim.making.outlines import SIDE, UP
 from artsim.making.solids import box, cylinder, ellipsoid, hull_of, revolved, rod, tube, union
 from artsim.model.kinematics import Array
+from artsim.model.transforms import rotation_about
 
 GAP = 0.001
 

@@ -15,9 +15,9 @@ from artsim.common.products import apply
 from artsim.families.details import holed_plate
 from artsim.families.keys import Face, key, key_outline, press, top_face
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, revolute
-from artsim.making.outlines import rotation_about
 from artsim.making.solids import Solid, cylinder, ellipsoid, hull, loft, rod, tube, union
 from artsim.model.kinematics import Array
+from artsim.model.transforms import rotation_about
 
 GAP = 0.0007
 

@@ -17,9 +17,9 @@ import numpy as np
 from artsim.common.elementary import cos, exp, log
 from artsim.common.products import apply, matmul, norm, unit
 from artsim.making.assembly import Assembly, JointSpec, Rng, pick
-from artsim.making.outlines import rotation_about
 from artsim.making.solids import Solid, box, ellipsoid, hull, ring, rod, tube, union
 from artsim.model.kinematics import Array
+from artsim.model.transforms import rotation_about
 
 GAP = 0.002
 _STUBS = np.concatenate([[0.0], 0.005 * exp(np.linspace(0.0, log(800.0), 50))])

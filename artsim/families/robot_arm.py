@@ -11,9 +11,10 @@ import numpy as np
 from artsim.common.products import apply, matmul
 from artsim.families.clearance import Link, narrow_limits
 from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute
-from artsim.making.outlines import rotation_about, rounded_rectangle
+from artsim.making.outlines import rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, hull, hull_of, ring
 from artsim.model.kinematics import Array
+from artsim.model.transforms import rotation_about
 
 GAP = 0.0015
 

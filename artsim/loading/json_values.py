@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from artsim.errors import AssetError
-from artsim.model.kinematics import LARGEST, Array
+from artsim.model.joints import LARGEST
+from artsim.model.kinematics import Array
 
 _MAX_NAME = 200
 """Characters of a name."""

@@ -33,7 +33,8 @@ from artsim.loading.partnet import read_side_files
 from artsim.loading.rest_frame import rest_rotation
 from artsim.loading.rest_state import canonical_category, rest_state
 from artsim.loading.urdf_document import UrdfJoint, UrdfLink, UrdfRobot
-from artsim.model.kinematics import Array, Joint, KinematicTree, Mimic
+from artsim.model.joints import Joint, Mimic
+from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.object_file import load_object
 from artsim.model.objects import ArticulatedObject, Part, Repair, content_sha256
 from artsim.model.transforms import compose_transform, transform_points

@@ -18,7 +18,8 @@ from artsim.loading.urdf_document import InlineMesh
 from artsim.loading.usd_shapes import KINDS, surface
 from artsim.loading.usd_values import flag, token
 from artsim.model.convex_bodies import convex_hull, is_convex
-from artsim.model.kinematics import LARGEST, Array
+from artsim.model.joints import LARGEST
+from artsim.model.kinematics import Array
 from artsim.model.objects import Mesh, Repair
 
 _THIN = 1e-4

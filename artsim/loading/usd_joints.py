@@ -11,7 +11,8 @@ from artsim.common.names import unused_name
 from artsim.common.products import matmul
 from artsim.loading.usd_bodies import StageReader, rigid
 from artsim.loading.usd_values import flag, number, rotation, token, vectors
-from artsim.model.kinematics import LARGEST, Array
+from artsim.model.joints import LARGEST
+from artsim.model.kinematics import Array
 from artsim.model.objects import Repair
 from artsim.model.transforms import compose_transform
 

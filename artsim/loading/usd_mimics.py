@@ -22,7 +22,7 @@ from artsim.loading.urdf_document import MimicRelation
 from artsim.loading.usd_bodies import StageReader
 from artsim.loading.usd_joints import FreeAxis, UsdJoint
 from artsim.loading.usd_values import flag, number, numbers, token
-from artsim.model.kinematics import LARGEST
+from artsim.model.joints import LARGEST
 from artsim.model.objects import Repair
 
 _DEGREE = float(np.pi / 180.0)

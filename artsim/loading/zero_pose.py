@@ -20,7 +20,8 @@ from artsim.loading.scene_objects import WorldLink, chosen
 from artsim.loading.urdf_document import UrdfJoint, UrdfLink, UrdfRobot
 from artsim.loading.xml_values import Element
 from artsim.model.inertia import Inertia, combine_inertias
-from artsim.model.kinematics import LARGEST, Array
+from artsim.model.joints import LARGEST
+from artsim.model.kinematics import Array
 from artsim.model.objects import Repair
 from artsim.model.transforms import compose_transform
 

@@ -10,10 +10,12 @@ import numpy as np
 
 from artsim.common.products import apply, unit
 from artsim.errors import AssetError, KinematicsError
-from artsim.making.outlines import Vector, rotation_about
+from artsim.making.outlines import Vector
 from artsim.making.solids import Solid
-from artsim.model.kinematics import Array, Joint, KinematicTree, Mimic
+from artsim.model.joints import Joint, Mimic
+from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import ArticulatedObject, Body, Part, content_sha256
+from artsim.model.transforms import rotation_about
 
 Rng = np.random.Generator
 """What families draw from: an explicit generator, never a global one."""
@@ -172,7 +174,7 @@ class Assembly:
 
     @property
     def joint_types(self) -> tuple[str, ...]:
-        """Types of the joints, the root's first, as :class:`~artsim.model.kinematics.Joint` names them."""
+        """Types of the joints, the root's first, as :class:`~artsim.model.joints.Joint` names them."""
         return tuple("free" if joint is None else joint.type for joint in self._joints)
 
     @property

@@ -8,9 +8,8 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.common.elementary import power as raised
-from artsim.common.products import matmul, unit
+from artsim.common.products import unit
 from artsim.model.kinematics import Array
-from artsim.model.transforms import cross_matrix
 
 Vector = Sequence[float] | Array
 FRONT = np.array([-1.0, 0.0, 0.0])
@@ -39,13 +38,6 @@ def turns(count: int, start: float = 0.0) -> list[float]:
 def arch(half: float, rise: float, count: int, first: float = 0.0, last: float = np.pi) -> list[tuple[float, float]]:
     """Points of an ellipse about 0 between two angles: by default over the top, from one side to the other."""
     return [(half * cos(a), rise * sin(a)) for a in np.linspace(first, last, count).tolist()]
-
-
-def rotation_about(axis: Vector, angle: float) -> Array:
-    """(3, 3) rotation by ``angle`` radians about an axis of any length (Rodrigues' formula)."""
-    cross = cross_matrix(unit(axis))
-    rotation: Array = np.eye(3) + sin(angle) * cross + (1.0 - cos(angle)) * matmul(cross, cross)
-    return rotation
 
 
 def frame_about(normal: Vector) -> tuple[Array, Array]:

@@ -18,8 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from artsim.common.elementary import cos, sin
 from artsim.common.products import apply, dot, unit
-from artsim.making.outlines import Span, Vector, circle, ends, frame_about, rotation_about, rounded_rectangle
+from artsim.making.outlines import Span, Vector, circle, ends, frame_about, rounded_rectangle
 from artsim.model.kinematics import Array
+from artsim.model.transforms import rotation_about
 
 Along = float | tuple[float, float]
 """Where something is along an axis, or its two ends."""

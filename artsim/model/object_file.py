@@ -15,7 +15,8 @@ from artsim.common.array_files import MAX_ARRAY_BYTES, parse_npz
 from artsim.common.files import parse_json, read_bounded, write_atomic
 from artsim.common.names import printable
 from artsim.errors import AssetError, KinematicsError
-from artsim.model.kinematics import LARGEST, Array, KinematicTree
+from artsim.model.joints import LARGEST
+from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import MAX_PARTS, ArticulatedObject, Part, Repair
 
 _COMPILED_FORMAT = 1

@@ -17,7 +17,8 @@ from artsim.common.showing import Showable
 from artsim.common.tables import brief, centimetres, cut, joint_value, label_of, plural, table, three_digits
 from artsim.errors import AssetError, ConfigError, KinematicsError
 from artsim.model.inertia import Inertia
-from artsim.model.kinematics import LARGEST, Array, KinematicTree
+from artsim.model.joints import LARGEST
+from artsim.model.kinematics import Array, KinematicTree
 
 if TYPE_CHECKING:
     import trimesh

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from artsim.common.names import safe_name, unused_name
 from artsim.errors import AssetError
 from artsim.model.inertia import Inertia, combine_inertias
-from artsim.model.kinematics import Array, Joint
+from artsim.model.joints import Joint
+from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject, Mesh
 from artsim.model.part_inertia import part_inertia
 

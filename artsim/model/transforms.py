@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from artsim.common.products import apply, matmul
+from artsim.common.elementary import cos, sin
+from artsim.common.products import apply, matmul, unit
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,13 @@ def cross_matrix(vectors: ArrayLike) -> Array:
     matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
     matrix[..., 1, 0], matrix[..., 2, 0], matrix[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
     return matrix
+
+
+def rotation_about(axis: ArrayLike, angle: float) -> Array:
+    """(3, 3) rotation by ``angle`` radians about an axis of any length (Rodrigues' formula)."""
+    cross = cross_matrix(unit(axis))
+    rotation: Array = np.eye(3) + sin(angle) * cross + (1.0 - cos(angle)) * matmul(cross, cross)
+    return rotation
 
 
 def compose_transform(position: ArrayLike, rotation: ArrayLike | None = None) -> Array:

@@ -23,7 +23,8 @@ from artsim.export.mjcf import mjcf_text
 from artsim.export.options import ExportOptions
 from artsim.export.text import obj_text
 from artsim.model.draws import farther_ends
-from artsim.model.kinematics import ROTATING, Array
+from artsim.model.joints import ROTATING
+from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 from artsim.model.robot import as_robot
 

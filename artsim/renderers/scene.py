@@ -13,7 +13,8 @@ from artsim.common.products import matmul
 from artsim.errors import ConfigError
 from artsim.model.appearance import Coat, Lights
 from artsim.model.frame import BACKGROUND
-from artsim.model.kinematics import Array, Joint, KinematicTree
+from artsim.model.joints import Joint
+from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import ArticulatedObject, Mesh, Part, content_sha256
 from artsim.model.transforms import transform_points
 

@@ -21,7 +21,8 @@ from artsim.common.extras import require_extra, silence_output
 from artsim.errors import ConfigError, RenderError
 from artsim.model.camera import Camera
 from artsim.model.frame import Frame
-from artsim.model.kinematics import ROTATING, Array
+from artsim.model.joints import ROTATING
+from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject, Part
 from artsim.renderers.view_batch import Clouds, Images, Views
 

@@ -12,10 +12,10 @@ import numpy as np
 from artsim.common.elementary import arccos, arctan2, cos
 from artsim.common.extras import require_extra
 from artsim.common.products import apply, dot, matmul, unit
-from artsim.making.outlines import rotation_about
 from artsim.model.appearance import Coat
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject, Part
+from artsim.model.transforms import rotation_about
 from artsim.renderers.scene import Thing, used_vertices
 
 GAP = 0.004

@@ -9,12 +9,11 @@ import numpy as np
 
 from artsim.common.extras import import_mujoco
 from artsim.common.products import apply, matmul, norm
-from artsim.making.outlines import rotation_about
 from artsim.model.appearance import Coat
 from artsim.model.convex_bodies import add_bodies, convex_hull
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
-from artsim.model.transforms import transform_points
+from artsim.model.transforms import rotation_about, transform_points
 from artsim.renderers.scene import Thing
 from artsim.scenes.placement import Area, resting_rotation
 

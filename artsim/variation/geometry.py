@@ -10,7 +10,8 @@ import numpy as np
 from manifold3d import Manifold
 from numpy.typing import NDArray
 
-from artsim.model.kinematics import Array, Joint, KinematicTree, Mimic
+from artsim.model.joints import Joint, Mimic
+from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import UNKNOWN_DYNAMICS, ArticulatedObject, Body, Mesh, Part
 from artsim.model.stretching import AxisMap
 

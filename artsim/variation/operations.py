@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.making.outlines import rotation_about
 from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import ArticulatedObject
 from artsim.model.stretching import APART, SIDEWAYS, AxisMap, coupled_axes, draw_axis_map, stretchable_axes
+from artsim.model.transforms import rotation_about
 from artsim.variation.geometry import fitted, resized, stretched, triple
 
 Change = tuple[ArticulatedObject, dict[str, Any]]

@@ -8,7 +8,8 @@ from artsim.envs.maniskill.goal import LEAST_OPEN, MOST_OPEN, Goal
 from artsim.envs.maniskill.robots import FLOATING, ROBOTS
 from artsim.model.camera import look_at_transform
 from artsim.model.draws import bounding_sphere, farther_ends
-from artsim.model.kinematics import ROTATING, Array
+from artsim.model.joints import ROTATING
+from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 from artsim.physics.episode import most_open_state
 

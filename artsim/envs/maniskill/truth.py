@@ -13,7 +13,8 @@ from torch import Tensor
 from artsim.envs.maniskill.goal import APART, LEAST_OPEN, MOST_OPEN, Goal
 from artsim.envs.maniskill.places import T_world_object, handle
 from artsim.model.draws import farther_ends, joint_intervals
-from artsim.model.kinematics import JOINT_TYPES, ROTATING, Array
+from artsim.model.joints import JOINT_TYPES, ROTATING
+from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 
 Record = dict[str, Tensor]
@@ -26,7 +27,7 @@ class Truth:
     Attributes
     ----------
     fixed : dict
-        Rows, as :func:`artsim.datasets.padding.pad_sample` names them: ``part_valid (B, P)`` and ``joint_type``,
+        Rows, as :func:`artsim.observing.padding.pad_sample` names them: ``part_valid (B, P)`` and ``joint_type``,
         ``joint_parent``, ``joint_axis``, ``joint_origin``, ``joint_rest``, ``joint_limits``, ``box_center``,
         ``box_size``, and for each object ``scale``, ``diagonal``, ``T_world_object (B, 4, 4)``.
     free : (B, P) bool

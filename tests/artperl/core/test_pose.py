@@ -21,7 +21,8 @@ from artperl.core.pose import (
 from artperl.core.rotations import rotation_from_vector
 from artperl.core.trees import Trees
 from artsim.model.draws import StateOptions, sample_state
-from artsim.model.kinematics import Joint, KinematicTree, Mimic
+from artsim.model.joints import Joint, Mimic
+from artsim.model.kinematics import KinematicTree
 
 
 def random_tree(rng: np.random.Generator, num_parts: int, mimic: bool = True) -> KinematicTree:

@@ -20,7 +20,8 @@ from artperl.fitting.beam_search import _grid, _joint_order, beam, half_turns
 from artperl.fitting.levenberg_marquardt import refine
 from artperl.fitting.refine_options import RefineOptions
 from artsim.datasets.plan import SampleOptions, draw_sample
-from artsim.model.kinematics import Joint, KinematicTree, Mimic
+from artsim.model.joints import Joint, Mimic
+from artsim.model.kinematics import KinematicTree
 from artsim.renderers import shared_renderer
 from tests.conftest import installed
 

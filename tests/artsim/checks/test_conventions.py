@@ -12,7 +12,8 @@ from artsim import make
 from artsim.checks.conventions import Frame, differences, joint_sort
 from artsim.checks.realism import REAL, read_split, real_objects
 from artsim.families import CATEGORIES
-from artsim.model.kinematics import Joint, KinematicTree
+from artsim.model.joints import Joint
+from artsim.model.kinematics import KinematicTree
 from artsim.model.objects import ArticulatedObject
 from tests.artsim.checks.test_realism import SPLIT
 

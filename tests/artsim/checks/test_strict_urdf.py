@@ -12,7 +12,8 @@ from lxml import etree
 
 from artsim.checks.strict_urdf import strict_kinematics, strict_urdf
 from artsim.export import export
-from artsim.model.kinematics import Joint, KinematicTree
+from artsim.model.joints import Joint
+from artsim.model.kinematics import KinematicTree
 from tests.conftest import ASSETS, valve
 
 Mutation = Callable[[etree._Element], object]

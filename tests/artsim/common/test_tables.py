@@ -10,7 +10,8 @@ import pytest
 
 import artsim
 from artsim.common.tables import HEIGHT, WIDTH, table
-from artsim.model.kinematics import Joint, KinematicTree
+from artsim.model.joints import Joint
+from artsim.model.kinematics import KinematicTree
 from artsim.model.objects import ArticulatedObject, Part, Repair
 from artsim.observing.sample import Sample
 from tests.conftest import ASSETS, valve

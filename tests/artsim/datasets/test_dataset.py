@@ -19,12 +19,12 @@ import webdataset
 import artsim
 from artsim import StateOptions, observe, sample_state
 from artsim.datasets.object_cache import ObjectCache
-from artsim.datasets.padding import pad_sample
 from artsim.datasets.plan import SampleOptions
 from artsim.datasets.shards import sample_from_members, sample_members
 from artsim.errors import ConfigError, DatasetError
 from artsim.loading.sources import find_sources
-from artsim.model.kinematics import JOINT_TYPES
+from artsim.model.joints import JOINT_TYPES
+from artsim.observing.padding import pad_sample
 from artsim.observing.sample import Sample
 from tests.conftest import ASSETS, DEMO, in_another_process
 

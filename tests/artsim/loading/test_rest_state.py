@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 import artsim
 from artsim.loading.rest_state import canonical_category, rest_state
 from artsim.loading.sources import find_sources
-from artsim.model.kinematics import Joint, KinematicTree
+from artsim.model.joints import Joint
+from artsim.model.kinematics import KinematicTree
 from artsim.model.objects import ArticulatedObject
 from artsim.model.transforms import transform_points
 from tests.conftest import ASSETS, solid

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from artsim.errors import KinematicsError
-from artsim.model.kinematics import Joint, KinematicTree, Mimic
+from artsim.model.joints import Joint, Mimic
+from artsim.model.kinematics import KinematicTree
 from artsim.model.transforms import cross_matrix, invert_transform, transform_points
 
 

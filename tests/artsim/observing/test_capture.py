@@ -16,6 +16,7 @@ from artsim.datasets.sample_checks import sample_problems
 from artsim.loading.sources import find_sources
 from artsim.model.draws import sample_scale
 from artsim.model.frame import BACKGROUND
+from artsim.model.joints import Joint
 from artsim.model.objects import ArticulatedObject
 from artsim.model.transforms import invert_transform, transform_points
 from artsim.observing.sample import Sample
@@ -109,8 +110,8 @@ def test_the_visible_fraction_is_visible_over_amodal_pixels() -> None:
     assert observe(obj, [0.0, 0.0], camera).visible_fraction == pytest.approx([0.5, 1.0], abs=0.05)
 
 
-def _slide() -> list[artsim.model.kinematics.Joint]:
-    return [artsim.model.kinematics.Joint("slide", "prismatic", 0, lower=-1.0, upper=1.0)]
+def _slide() -> list[Joint]:
+    return [Joint("slide", "prismatic", 0, lower=-1.0, upper=1.0)]
 
 
 def test_images_agree_with_the_cloud() -> None:

@@ -11,7 +11,8 @@ import trimesh
 import artsim
 from artsim import Camera
 from artsim.model.frame import BACKGROUND, Frame
-from artsim.model.kinematics import Joint, KinematicTree
+from artsim.model.joints import Joint
+from artsim.model.kinematics import KinematicTree
 from artsim.model.objects import ArticulatedObject
 from artsim.renderers import render
 from tests.agreement import CLASSES, LIMITS, Agreement, Scene, classify, grazing, slivers

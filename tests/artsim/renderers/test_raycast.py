@@ -14,7 +14,7 @@ from artsim import Camera, StateOptions, ViewOptions, observe, render, sample_st
 from artsim.errors import ConfigError, RenderError
 from artsim.model.camera import points_from_depth
 from artsim.model.frame import BACKGROUND
-from artsim.model.kinematics import Joint
+from artsim.model.joints import Joint
 from artsim.model.objects import Part
 from artsim.observing.capture import draw_visible
 from artsim.renderers import make_renderer

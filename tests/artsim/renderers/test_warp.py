@@ -19,7 +19,7 @@ from artsim import Camera, StateOptions, make, make_renderer, observe, sample_st
 from artsim.errors import ArtsimError, ConfigError, KinematicsError
 from artsim.families import FAMILIES
 from artsim.model.frame import BACKGROUND, Frame
-from artsim.model.kinematics import Joint
+from artsim.model.joints import Joint
 from artsim.model.objects import ArticulatedObject, Part
 from artsim.renderers import render_cameras
 from artsim.renderers.raycast import pose

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from artsim.common.sharding import Shared
 from artsim.errors import ConfigError
-from artsim.model.kinematics import JOINT_TYPES
+from artsim.model.joints import JOINT_TYPES
 from artsim.observing.sample import Sample
 
 _PER_PART = (
@@ -23,7 +23,7 @@ def pad_sample(sample: Sample, max_parts: int, float32: bool = False) -> dict[st
     """A sample as arrays whose shapes do not depend on its number of parts. Loops may write into them.
 
     ``part_valid (P,) bool`` marks the rows that are parts, rows beyond are zero; ``joint_type (P,) int64`` indexes
-    ``artsim.model.kinematics.JOINT_TYPES``; infinite limits stay infinite.
+    ``artsim.model.joints.JOINT_TYPES``; infinite limits stay infinite.
 
     Parameters
     ----------
