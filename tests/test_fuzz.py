@@ -45,6 +45,7 @@ def test_mutated_files_end_in_our_own_errors(kind: str, desk: Path) -> None:
     assert not findings
 
 
+@pytest.mark.slow
 def test_seeds_are_small_and_read_without_an_error(desk: Path) -> None:
     for seed in corpus():
         assert sum(map(len, seed.files.values())) < 60_000

@@ -62,6 +62,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_datasets_and_their_streams_can_be_written_to(folder: Path) -> None:
     """Loaders warn of arrays that cannot be written to: there are none."""
     dataset = artsim.open_dataset(folder)

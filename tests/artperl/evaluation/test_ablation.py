@@ -37,6 +37,7 @@ def test_a_shuffled_base_finds_other_objects_of_the_same_tree() -> None:
     assert all(base.categories[a] == base.categories[b] for a, b in enumerate(found))
 
 
+@pytest.mark.slow
 def test_every_stage_can_be_taken_away() -> None:
     (sample,) = frozen_samples(["laptop"], 1, 1)
     torch.manual_seed(0)

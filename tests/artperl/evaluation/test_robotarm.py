@@ -32,6 +32,7 @@ def test_points_of_the_arm_lie_on_its_parts_up_to_the_sensors_noise(clouds: list
         assert (np.abs(off) <= size / 2 + 0.02).all(axis=1).mean() > 0.9
 
 
+@pytest.mark.slow
 def test_masks_take_in_points_of_other_things(clouds: list[Sample]) -> None:
     shares = [(sample.part == FOREIGN).mean() for sample in clouds]
     assert 0.0 < np.mean(shares) < 0.2

@@ -205,6 +205,7 @@ def test_the_command_that_a_damaged_run_names_begins_it_anew(
     ends_alike(whole, trained)
 
 
+@pytest.mark.slow
 def test_a_lost_best_estimator_is_told(trained: Path) -> None:
     shutil.rmtree(trained / "best")
     with pytest.raises(DatasetError, match="the best estimator is lost"):

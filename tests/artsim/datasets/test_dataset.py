@@ -79,6 +79,7 @@ def test_length_indexing_and_splits(folder: Path) -> None:
         artsim.open_dataset(folder, "holdout")
 
 
+@pytest.mark.slow
 def test_samples_know_their_object_without_the_source_files(folder: Path) -> None:
     dataset = artsim.open_dataset(folder)
     for i in (0, 40, 149):
@@ -139,6 +140,7 @@ def test_the_stream_is_endless_repeatable_and_new(folder: Path) -> None:
         dataset.stream("val")
 
 
+@pytest.mark.slow
 def test_training_processes_share_a_stream(folder: Path) -> None:
     dataset = artsim.open_dataset(folder)
     stream = dataset.stream("test", start=1, step=3)

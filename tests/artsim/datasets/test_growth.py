@@ -54,6 +54,7 @@ def test_an_extended_dataset_has_the_bytes_of_a_large_one(large: Path, tmp_path:
         make(out, 50)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "where"), [(generating, "Restoration"), (generating, "examine"), (restore, "write_if_other")]
 )

@@ -242,6 +242,7 @@ def test_there_are_more_than_twenty_kinds_of_damage() -> None:
     assert len(DAMAGES) >= 20
 
 
+@pytest.mark.slow
 def test_the_same_generate_command_repairs_too(folder: Path, sound: Path, sources: list[Source]) -> None:
     (folder / MADE).unlink()
     flip(folder / SHARD)  # of the right size: only its sum tells

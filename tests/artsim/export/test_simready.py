@@ -27,6 +27,7 @@ def package(obj: ArticulatedObject, folder: Path) -> Path:
     return file
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("category", ["refrigerator", "cart", "phone", "robot_arm"])
 def test_a_package_passes_every_requirement_of_the_profile(category: str, tmp_path: Path) -> None:
     installed("simready")
@@ -61,6 +62,7 @@ def test_a_real_object_passes_too_and_its_picture_shows_it(partnet_dir: Path, tm
     assert str(partnet_dir) not in str(metadata(as_robot(obj)))  # no folder of this machine
 
 
+@pytest.mark.slow
 def test_bytes_depend_on_the_object_and_the_date_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     installed("pxr")
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
@@ -83,6 +85,7 @@ def test_one_file_holds_the_object_with_its_textures(tmp_path: Path) -> None:
     np.testing.assert_allclose(loaded.tree.limits[1:], obj.tree.limits[1:], atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("obj", [valve(), artsim.make("drawer", 3), artsim.make("laptop", 1)], ids=lambda o: o.category)
 def test_newton_reads_limits_friction_speeds_efforts_masses_and_mimics(obj: ArticulatedObject, tmp_path: Path) -> None:
     newton = installed("newton")

@@ -77,6 +77,7 @@ def test_what_ends_it_is_an_error_and_the_next_file_is_read(what: str, amount: f
     assert ask()[0] != before
 
 
+@pytest.mark.slow
 def test_large_content_may_take_more() -> None:
     with pytest.raises(AssetError, match="takes over 50 MB"):
         ask("memory", 100)

@@ -93,6 +93,7 @@ def test_a_sky_of_strength_1_shows_a_level_surface_in_its_own_colour(sapien: Ren
     assert (seen_from_above((floor(), *shaft), sky, sapien, samples=8)[32, 32] < 0.75 * open_air).all()
 
 
+@pytest.mark.slow
 def test_things_cast_shadows_where_geometry_says(sapien: Renderer) -> None:
     sun = Lights(Sun((1.0, 0.0, -1.0), (1.0, 1.0, 1.0)), NONE, NONE)
     plate = place_solid("plate", box((-0.3, -0.1, 0.199), (-0.1, 0.1, 0.2)), MATT)

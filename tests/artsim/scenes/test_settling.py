@@ -42,6 +42,7 @@ def test_nothing_is_in_another_or_in_the_table(scenes: list[Scene]) -> None:
             assert all(are_apart(one, other, 1e-5) for other in own[:i])
 
 
+@pytest.mark.slow
 def test_some_lie_on_others_and_not_all_as_they_were_made(scenes: list[Scene]) -> None:
     own = [thing for scene in scenes for thing in things(scene)]
     assert any(thing.vertices[:, 2].min() > 0.005 for thing in own)
