@@ -1,7 +1,5 @@
 """A gallery of procedural objects: each category's objects in a few joint states, as one picture."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """A readable description of an object: its tree, joints, limits, boxes and repairs."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.names import printable

@@ -3,8 +3,6 @@
 The page draws with three.js, which comes in the package trimesh and is copied into each page when it is made.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import zipfile

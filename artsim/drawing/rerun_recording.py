@@ -1,7 +1,5 @@
 """Recordings for the rerun viewer: clouds, boxes, joint axes and images on a timeline."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

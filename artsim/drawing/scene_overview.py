@@ -1,7 +1,5 @@
 """Pictures of a scene's ground truth: colour, depth, parts and instances, with boxes and joint axes drawn in."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -4,8 +4,6 @@
 ``ArtSimArticulated-v1`` (ManiSkill 3): :mod:`artsim.envs.maniskill`, of which nothing heavy is imported before use.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from artsim.common.extras import require_extra

@@ -10,8 +10,6 @@
     observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any

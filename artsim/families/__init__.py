@@ -5,8 +5,6 @@ draws proportions, details and the shape of the kinematic tree, in metres, with 
 leaves a gap between parts in every joint state. ``CONTRIBUTING.md`` shows how to add one.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace

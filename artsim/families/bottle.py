@@ -7,8 +7,6 @@ on or that is fixed; pumps slide in a collar that turns; sprayers have a trigger
 preserving jars have a bail. One to three parts move.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

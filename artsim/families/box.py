@@ -4,8 +4,6 @@ Sizes and proportions, the shape of lids (flat, hollow, domed, with a skirt), co
 dividers, handles and latches of rigid boxes vary.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin

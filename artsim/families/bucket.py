@@ -5,8 +5,6 @@ wire or straps, with or without a grip, where the pins are, and how far the bail
 rest.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, hypot, power, sin

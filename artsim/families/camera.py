@@ -5,8 +5,6 @@ three tubes that slide out of each other, a cap), dials and buttons on top and a
 screen that swings out at the back or at the side, a back that opens, a door at the side. Two to eleven parts move.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin

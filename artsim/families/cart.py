@@ -5,8 +5,6 @@ hang in casters that swivel, handles that fold, slide out or are fixed, a flap, 
 drawers and doors, an axle that steers with a drawbar, a tailgate. One to fourteen parts move.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.families.details import front_handle, side_hinge

@@ -5,8 +5,6 @@ other, around a hole, or with the inner pair folding down into the carton. Sizes
 flaps reach and turn, and hand holes vary.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.families.proportions import unusual_sides

@@ -1,7 +1,5 @@
 """What each procedural category is: its family's own words, and what its first objects are like."""
 
-from __future__ import annotations
-
 import inspect
 import sys
 from collections import Counter

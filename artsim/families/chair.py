@@ -5,8 +5,6 @@ fixed column, seat, back (fixed or tilting, framed or solid), head rest, arm res
 the seat, a knob at its side.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin

@@ -6,8 +6,6 @@ before the pendulum, doors of a cuckoo, a lid, bells with a hammer, knobs, a for
 parts move. Hands turn freely about the middle of the face, clockwise as seen from the front.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin

@@ -1,7 +1,5 @@
 """What clocks have in common: faces with marks, rims, hands, pendulums, glass doors."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin

@@ -6,8 +6,6 @@ freely; buttons travel; carafes and water tanks come out. Sizes, round or square
 vary.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import power

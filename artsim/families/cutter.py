@@ -4,8 +4,6 @@ Varied: size (slim ones of sheet steel to wide box cutters), nose of the handle,
 grooves and bulges of the handle, a cap at the back that pulls out, and a locking wheel on the blade's button.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin, tan

@@ -1,7 +1,5 @@
 """Desk sets among the telephones: a sloping base with keys or a dial, a handset on it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin

@@ -1,7 +1,5 @@
 """Details that several families share: handles and hinged panels."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

@@ -5,8 +5,6 @@ strip of controls, or only over the upper half; between side panels or over them
 relief and inner liner of the door; racks inside, fixed or on slides; spray arm; buttons and dials.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ swings up or down; a jar with a lid that lifts or swings, one or two taps with l
 its bottle, levers or buttons, and a door below. One to six parts move.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin

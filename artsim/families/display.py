@@ -5,8 +5,6 @@ the foot (plate, disc, two legs, ring, arms); which of turn, height, tilt and po
 limits; keys, knobs and rabbit ears.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import arcsin, cos, hypot, sin

@@ -5,8 +5,6 @@ Sizes, panels, the frame's shape (with fanlight, side light, round arch or a wal
 door stands), the thickness of the wall, handles and how far the leaf opens vary.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -5,8 +5,6 @@ those of a row and how high those of a column are, on which side of a desk they 
 table as well; open compartments and fronts that do not move; legs, plinths and shelves; fronts and handles.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

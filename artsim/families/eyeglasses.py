@@ -5,8 +5,6 @@ thick, above only, none), the bridge (one bar, two, saddle), nose pads, the wrap
 wire, tapered, bent ends, sleeves, or slim, on hinges without knuckles), and which temple folds above the other.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -4,8 +4,6 @@ What varies: the kind, 3 to 6 blades and their shape, the cage, a telescopic col
 side, tilts, or both.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

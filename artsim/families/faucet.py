@@ -5,8 +5,6 @@ spout (gooseneck, bow, straight tube, flat bar), one or two handles (levers, pad
 turn and lean, the body and its feet.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import arcsin, cos, sin

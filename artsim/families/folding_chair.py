@@ -5,8 +5,6 @@ that folds down on the seat, a seat that tips up between its sides), tubes or ba
 board, fabric, frame), arms, stretchers.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import arctan2, cos, hypot, sin

@@ -5,8 +5,6 @@ the blades (drop point, clip, sheep's foot, spear), a pocket knife with up to si
 from both ends, and the angle to which each opens.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, power, sin

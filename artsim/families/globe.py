@@ -4,8 +4,6 @@ What varies: size, tilt, the arc (half, whole ring, round or flat), the stand (d
 horizon), finials, and whether the arc itself turns on the stand.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

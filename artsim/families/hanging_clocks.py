@@ -1,7 +1,5 @@
 """Clocks that hang on a wall: plain ones, those with a pendulum, cuckoo clocks."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin

@@ -6,8 +6,6 @@ that swings down or that stands fast, or a grip at the back), a cover of the spo
 below, on which electric kettles turn or from which they lift. One to three parts move.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos

@@ -1,7 +1,5 @@
 """Layouts of keyboards: groups of cells, each of which moves as one part. Lengths are in key pitches."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

@@ -5,8 +5,6 @@ halves); pitch, rows, columns, wide keys, height and shape of the caps, stepped 
 its outline, rims, strips of media keys; feet that fold out, knobs, rollers, faders, wrist rests, cables.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Keys and buttons on flat faces, and bodies of varying cross-section, as handheld and desktop devices have them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ What varies: the size and the shape, one long or two short handles of several ki
 its knob or bow, whether the lid lifts off or swings up about a hinge at the back.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, hypot, sin

@@ -5,8 +5,6 @@ springs, a parallel rod that follows the lower arm, a third arm, and the shade (
 in :mod:`artsim.families.standing_lamp`.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

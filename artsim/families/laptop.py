@@ -5,8 +5,6 @@ that is shorter than the lid or reaches behind the hinge, one long hinge or two 
 number block, touchpad and its buttons, the screen's frame, badges, feet, how far the lid opens.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lenses of cameras: rings that turn, tubes that slide out of each other, caps."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin

@@ -4,8 +4,6 @@ What varies: kind, size and cross-section; the spark wheel and the lever or butt
 and limits; slots and vents; the length and bend of a long lighter's nozzle, its trigger, safety switch and gas wheel.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import arctan2, cos, sin

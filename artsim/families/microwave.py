@@ -4,8 +4,6 @@ What varies: hinge on the left, on the right or at the bottom; controls beside, 
 a key that opens the door; dials, keys that move or stay; turntable or a flat floor; feet, vents.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin

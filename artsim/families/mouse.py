@@ -4,8 +4,6 @@ What varies: length, width, height, where the hump is, waist and ends, how steep
 buttons; a wheel between them, keys on the side and on top, a ball to turn; the roll of upright mice; glides, a cable.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ What varies: one door or two that drop down, or one that opens sideways; a drawe
 a glass top; a guard at the back; dials in front or on the guard, with or without stops; window, handle, racks, feet.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -4,8 +4,6 @@ What varies: kind (cap that slides or screws off, one at either end, push button
 length, thickness, cross-section (round, with edges, flat), bulges and grips of the barrel, clip, tip and end.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -5,8 +5,6 @@ handset); proportions, round edges, bent backs; keypads and their keys, function
 cameras; on desk sets the slope, a dial in place of keys, a display that tilts, the handset's shape.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

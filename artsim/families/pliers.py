@@ -4,8 +4,6 @@ Varied: size, the jaws (combination, long nose, flat, cutting, round hole of a g
 grips (bare, dipped, thick with a guard), the rivet, and how far they open.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import power, sin

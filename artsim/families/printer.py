@@ -6,8 +6,6 @@ scanner's lid with or without a feeder and its tray, an output slope with a stop
 round edges, feet, casters.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ A flat draw over all that a category holds makes most objects odd. So the usual 
 tails seldom.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ What varies: layout, side of the hinges, freezer above or below, doors or drawer
 doors, shelves, crispers; dispenser, feet, round edges, overhanging top.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

@@ -5,8 +5,6 @@ edges; bands of keys (numbers, rows, tall rockers, a slide switch, a navigation 
 and number; a battery cover that slides or swings; a front cover that slides or swings; a hinged antenna.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import exp, sin

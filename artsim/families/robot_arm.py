@@ -4,8 +4,6 @@ Joints turn across the links (bends), along them (rolls) or slide (telescopes, r
 varies: the order of the joints, lengths, thickness, the shape of links, the side that each bend steps to, the tool.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.products import apply, matmul

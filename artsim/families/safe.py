@@ -5,8 +5,6 @@ right, inside or on barrels outside; dial, keypad or keyhole; lever, wheel with 
 feet, round edges.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, hypot, sin

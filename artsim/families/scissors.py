@@ -7,8 +7,6 @@ Varied: length, the share of the blades, their width, points and backs, handles 
 round or long, alike or one longer than the other, offset to one side, open finger rests, and the pivot.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import arcsin, arctan2, cos, hypot, sin

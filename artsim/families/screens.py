@@ -1,7 +1,5 @@
 """Panels of displays: flat or bent ones, their screens towards -X."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Shopping carts, one kind of cart: a basket of bars or of one piece on a frame, with casters and a child seat."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

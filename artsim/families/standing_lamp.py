@@ -4,8 +4,6 @@ What varies: height, foot (disc, square, three legs, vase), pole, shade (cone, d
 turns or the pole slides, switches (pull chain, button, dial); of spotlights the mount, the yoke, the head, its flaps.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, hypot, power, sin

@@ -5,8 +5,6 @@ apart from the arm or one part with it, the profile of the arm (straight, arched
 cheeks at the hinge, a rubber pad, and how far each opens.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin

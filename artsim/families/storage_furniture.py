@@ -5,8 +5,6 @@ bottom), double doors, sliding doors or open shelves, and a door may hide trays 
 before or between the boards, kinds of panels and handles, tops, plinths, legs and shelves vary.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -6,8 +6,6 @@ Bags have one or two bails, on the crown or on the sides. Sizes, corners, ribs, 
 open vary.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import arctan2, cos, power, sin

@@ -4,8 +4,6 @@ What varies: how many, what kind, side by side or above one another, square and 
 bevels, how long toggles are.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -5,8 +5,6 @@ consoles, low slabs, deep or tall stands), tops (square, round, oval), legs, the
 they hold, cells at the back, leaves that drop, tops that turn, tip or rise, a tray for a keyboard, wheels.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

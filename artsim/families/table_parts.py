@@ -1,7 +1,5 @@
 """Pieces of tables: tops, legs, cases with drawers and doors, leaves, trays, wheels."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ What varies: slots, short or long, one lever or two; box, arch or loaf; guides o
 at the back; feet or a base; rack for buns on top.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.families.details import dial, push_button

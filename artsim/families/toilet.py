@@ -5,8 +5,6 @@ the wall), its lid (fixed or lifted off), lever or one or two buttons and where 
 lid, hinges.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -4,8 +4,6 @@ Round or rectangular, low to slim and tall, straight or tapered; the lid turns a
 halves at the sides. A pedal follows the lid; wheelie bins have two wheels and a grip at the back.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.families.details import rounded_tray

@@ -5,8 +5,6 @@ length, width, thickness and outline of the body (rectangle, oval, tapered, wais
 and hinged bails; a switch on the side.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

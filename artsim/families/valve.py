@@ -4,8 +4,6 @@ What varies: one to three valves on a pipe, flanges or threaded ends, the bonnet
 whether the stem rises with the wheel (screw joint) or the wheel only turns.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin

@@ -1,7 +1,5 @@
 """Closed vessels that several families share: moulded bodies of any outline, necks, caps that cover them, pumps."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Carts to pull: wagons whose front axle steers, and hand carts on two large wheels."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import arctan2, cos, sin

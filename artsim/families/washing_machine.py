@@ -5,8 +5,6 @@ keys and display; console of a top loader, its lid hinged at the back or at a si
 feet, plinth, worktop.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin

@@ -1,7 +1,5 @@
 """Wheels and casters of carts, and the bars of their frames."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.common.elementary import cos, sin

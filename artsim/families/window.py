@@ -4,8 +4,6 @@ Sashes open towards -X, the room; hinged ones mostly have a handle that turns, a
 mullions, fixed lights, sills, the surrounding wall, and how far the sashes open vary.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.families.details import bar_handle, grid_panel, swing_limits

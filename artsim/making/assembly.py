@@ -1,7 +1,5 @@
 """Assemblies: solids put together by joints, as the families of procedural objects describe them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar

@@ -1,7 +1,5 @@
 """What solids are drawn from: directions, spans, angles, and outlines, which are arrays of points."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

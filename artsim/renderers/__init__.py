@@ -1,7 +1,5 @@
 """Renderers behind one protocol, by name."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 from importlib import import_module

@@ -1,7 +1,5 @@
 """What every renderer does: turn a posed object and a camera into a frame."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 

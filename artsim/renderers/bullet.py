@@ -1,7 +1,5 @@
 """PyBullet's two rasterisers: TinyRenderer (software, always there) and EGL (OpenGL without a display)."""
 
-from __future__ import annotations
-
 import importlib.util
 import tempfile
 import weakref

@@ -1,7 +1,5 @@
 """What renderers that load geometry keep loaded: the latest few objects and scenes."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Generic, Protocol, TypeVar

@@ -1,7 +1,5 @@
 """Outlines of parts in the image: bounds that are never too small, from a few corners around each part."""
 
-from __future__ import annotations
-
 import itertools
 from functools import cache
 

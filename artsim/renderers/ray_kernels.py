@@ -3,8 +3,6 @@
 Nothing here contracts or reorders floating-point operations, so that clouds are the same bytes on every processor.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Triangles to cast rays at: Embree's, or Warp's where Embree has no wheel, which is Linux on ARM."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from typing import Any, Protocol
 

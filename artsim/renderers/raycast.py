@@ -5,8 +5,6 @@ nothing is rebuilt when the state changes. Only the pixels of a part's projected
 have z = 1 in the camera frame, which makes the ray parameter the z-depth itself.
 """
 
-from __future__ import annotations
-
 import weakref
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

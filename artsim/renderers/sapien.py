@@ -1,7 +1,5 @@
 """SAPIEN: a Vulkan rasteriser, on a GPU or on a CPU through Mesa's lavapipe."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Sequence

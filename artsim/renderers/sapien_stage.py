@@ -1,7 +1,5 @@
 """What SAPIEN draws: solids with their coats, light, and a camera."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import ModuleType

@@ -1,7 +1,5 @@
 """Scenes: several posed articulated objects among other things, and what a camera sees of them. Plain data."""
 
-from __future__ import annotations
-
 import weakref
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Whole scenes through any renderer."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 

@@ -5,8 +5,6 @@ Each part has a static acceleration structure of its own, and rays are carried i
 Warp's: ``.numpy()`` copies one, ``warp.to_torch`` or ``torch.from_dlpack`` share its memory.
 """
 
-from __future__ import annotations
-
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass

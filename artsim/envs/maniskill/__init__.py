@@ -13,8 +13,6 @@ environment itself is :class:`artsim.envs.maniskill.task.ArticulatedTask`; impor
 ManiSkill.
 """
 
-from __future__ import annotations
-
 ENV_ID = "ArtSimArticulated-v1"
 RECORDED_ID = f"artsim.envs:{ENV_ID}"
 """The id as programs know it that import no artsim: gymnasium imports the module before the colon."""

@@ -1,7 +1,5 @@
 """An object as an articulation in one of ManiSkill's sub-scenes, made in memory through ManiSkill's own builder."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

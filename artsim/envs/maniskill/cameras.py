@@ -1,7 +1,5 @@
 """Cameras: artsim's, as ManiSkill takes them, and ManiSkill's, as the record tells of them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

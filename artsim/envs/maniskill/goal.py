@@ -1,7 +1,5 @@
 """The task: where joints begin, where they are to end, and how well they are on the way."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import torch

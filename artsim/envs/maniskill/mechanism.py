@@ -1,7 +1,5 @@
 """The objects of all sub-scenes as one: poses and joint states, read from the simulation and put into it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

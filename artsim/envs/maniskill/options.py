@@ -1,7 +1,5 @@
 """What users choose of the ManiSkill task, and what they are told when it makes no sense."""
 
-from __future__ import annotations
-
 import inspect
 from dataclasses import dataclass, field, fields
 from pathlib import Path

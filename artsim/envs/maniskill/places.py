@@ -1,7 +1,5 @@
 """Where things are: objects on the ground, handles on their parts, the robot before them, and who looks on."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.envs.maniskill.goal import LEAST_OPEN, MOST_OPEN, Goal

@@ -1,7 +1,5 @@
 """Options of the task in the JSON file of a recording, from which ManiSkill makes the environment again."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Robots that do the task, by ManiSkill's names, and how each of them begins."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The ManiSkill 3 task: a robot brings every joint of an articulated object to its goal."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from typing import Any
 

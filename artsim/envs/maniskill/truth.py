@@ -1,7 +1,5 @@
 """Ground truth of many objects at once, as tensors whose rows beyond an object's parts are zero."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

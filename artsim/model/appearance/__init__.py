@@ -3,8 +3,6 @@
 What looks like what is plain data, drawn from an explicit generator; renderers read it. Colours are sRGB, 0 to 1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Which materials an object without colours of its own is made of: drawn for each, plausible for its category."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Procedural textures: pictures of wood, stone, fabric and the like that repeat without a seam."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 
