@@ -340,9 +340,11 @@ def read_settings(folder: Path) -> dict[str, Any]:
         raise DatasetError(f"{_SETTINGS} is damaged: it says nothing about an estimator", folder, _AGAIN)
     if settings.get("format") != _FORMAT:
         raise DatasetError(f"format {settings.get('format')!r:.20} is not {_FORMAT}", folder, _AGAIN)
-    for name in ("calibration", "part_calibration"):
-        if isinstance(settings.get(name), dict):
-            settings[name] = {_RENAMED.get(key, key): value for key, value in settings[name].items()}
+    own = settings.get("options")
+    for values in (settings, own if isinstance(own, dict) else {}):  # methods have them among their options
+        for name in ("calibration", "part_calibration"):
+            if isinstance(values.get(name), dict):
+                values[name] = {_RENAMED.get(key, key): value for key, value in values[name].items()}
     return settings
 
 

@@ -117,7 +117,8 @@ def test_one_that_is_saved_comes_back_as_it_was(method: Stored, points: np.ndarr
     assert_same(method(points), loaded(points), method.name)
     save_estimator(loaded, tmp_path / "again", {"options": {"categories": ["laptop"]}})
     again = load_estimator(tmp_path / "again", method=method.name)
-    np.testing.assert_array_equal(again(points).T_camera_part, loaded(points).T_camera_part)
+    # Sums over weights that lie elsewhere in memory may be rounded otherwise.
+    assert_same(loaded(points), again(points), method.name)
     with pytest.raises(DatasetError, match=f"method {method.name!r}, not full.*--method {method.name}"):
         load_estimator(tmp_path)
 
