@@ -119,10 +119,10 @@ def test_true_answers_have_no_loss() -> None:
     obj = artsim.make("laptop", 4)
     sample = view(obj, 4)
     clouds, truth = truth_of(sample, 2)
-    loss, figures = coordinate_loss(TrueCoordinates(sample, 2), clouds, truth)
+    loss, figures = coordinate_loss(TrueCoordinates(sample, 2), clouds, truth, truth)
     assert loss.item() < 1e-3
     assert figures["accuracy"] == 1.0
-    loss, _ = joint_loss(TrueJoints(sample, 2), clouds, truth)
+    loss, _ = joint_loss(TrueJoints(sample, 2), clouds, truth, truth)
     assert loss.item() < 1e-2
     assert miou_loss(20.0 * torch.tensor([[[1.0, 0.0], [0.0, 1.0]]]), torch.tensor([[1, 0]])).item() > 0.99
 
