@@ -26,7 +26,7 @@ from artsim.loading.mesh_files.surface import (
     quote_name,
     transform_affine,
 )
-from artsim.model.transforms import compose_transform, rotation_of_quaternion
+from artsim.model.transforms import compose_transform, rotation_about
 
 _MAX_DEPTH = 150
 """Nodes inside nodes; far from Python's own limit."""
@@ -212,14 +212,8 @@ class _Scene:
 
 def _rotation(found: Array) -> Array:
     """About an axis, by degrees."""
-    x, y, z, degrees = found.tolist()
-    length = math.sqrt(x * x + y * y + z * z)
-    if length == 0.0:
-        return np.eye(4)
-    half = math.radians(0.5 * degrees)
-    along = math.sin(half) / length
-    turn = rotation_of_quaternion([along * x, along * y, along * z, math.cos(half)])
-    return compose_transform(np.zeros(3), turn)
+    turns = bool(found[:3].any())
+    return compose_transform(np.zeros(3), rotation_about(found[:3], np.deg2rad(found[3])) if turns else None)
 
 
 def _look_at(found: Array) -> Array:
