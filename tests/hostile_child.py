@@ -1,19 +1,20 @@
-"""Reads files in forked processes and says what came of each: run by ``test_hostile`` as a program of its own.
-
-Its argument is a JSON list of [kind, path]; its last line a JSON list of what came of each.
-"""
+"""Reads files in forked processes and says what came of each, as a program of its own: see :func:`read_each`."""
 
 from __future__ import annotations
 
 import json
 import os
 import signal
+import subprocess
 import sys
 import traceback
 from pathlib import Path
 from typing import Any
 
 from artsim.errors import ArtsimError
+
+SECONDS, MB = 4.0, 500.0
+"""2 s on a quiet core; one that is shared takes twice as long, what has no bound minutes."""
 
 
 def load(path: Path) -> str:
@@ -100,6 +101,26 @@ def forked(kind: str, path: Path) -> dict[str, Any]:
     _, status, usage = os.wait4(child, 0)
     result = json.loads(text) if text else {"raw": f"ended with status {status}"}
     return result | {"seconds": usage.ru_utime + usage.ru_stime, "mb": usage.ru_maxrss / 1024}
+
+
+def read_each(wanted: list[tuple[str, Path]], folder: Path) -> list[dict[str, Any]]:
+    """What comes of files by kind, each read in a process of its own in a folder."""
+    child = subprocess.run(
+        [sys.executable, "-m", "tests.hostile_child", json.dumps([(kind, str(path)) for kind, path in wanted])],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[1]), "OMP_NUM_THREADS": "1"},
+    )
+    assert child.returncode == 0, child.stderr
+    found: list[dict[str, Any]] = json.loads(child.stdout.splitlines()[-1])
+    return found
+
+
+def too_much(outcomes: dict[str, dict[str, Any]]) -> dict[str, tuple[float, int]]:
+    """Seconds and MB of those that take too much of either."""
+    figures = {name: (round(one["seconds"], 2), round(one["mb"])) for name, one in outcomes.items()}
+    return {name: f for name, f in figures.items() if f[0] > SECONDS or f[1] > MB}
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ import json
 import os
 import shutil
 import struct
-import subprocess
 import sys
 import zipfile
 import zlib
@@ -19,10 +18,10 @@ import pytest
 import artsim
 from artsim.commands.verbs import main
 from artsim.errors import ArtsimError, AssetError
+from tests.hostile_child import read_each, too_much
 
 CASES = Path(__file__).parent / "cases" / "hostile"
 ESTIMATOR = Path(__file__).parents[1] / "artperl" / "weights" / "laptop"
-SECONDS, MB = 4.0, 500.0  # 2 s on a quiet core; one that is shared takes twice as long, what has no bound minutes
 ONE_BOX = '<robot name="r"><link name="a"><visual><geometry><box size="1 1 1"/></geometry></visual></link></robot>'
 
 
@@ -280,17 +279,7 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, An
     root, empty = tmp_path_factory.mktemp("hostile"), tmp_path_factory.mktemp("here") / "a" / "b"
     empty.mkdir(parents=True)
     cases = made(root) | made_mjcf(root) | shared(root)
-    wanted = json.dumps([[kind, str(path)] for kind, path, _ in cases.values()])
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1]), "OMP_NUM_THREADS": "1"}
-    child = subprocess.run(
-        [sys.executable, "-m", "tests.hostile_child", wanted],
-        capture_output=True,
-        text=True,
-        cwd=empty,
-        env=environment,
-    )
-    assert child.returncode == 0, child.stderr
-    found = json.loads(child.stdout.splitlines()[-1])
+    found = read_each([(kind, path) for kind, path, _ in cases.values()], empty)
     written = sorted(str(path.relative_to(empty.parents[1])) for path in empty.parents[1].rglob("*") if path.is_file())
     return {name: one | {"text": cases[name][2], "written": written} for name, one in zip(cases, found, strict=True)}
 
@@ -314,8 +303,7 @@ def test_each_is_read_or_refused_in_one_line(outcomes: dict[str, dict[str, Any]]
 
 @pytest.mark.slow
 def test_each_takes_little_time_and_memory(outcomes: dict[str, dict[str, Any]]) -> None:
-    figures = {name: (round(one["seconds"], 2), round(one["mb"])) for name, one in outcomes.items()}
-    assert not {name: f for name, f in figures.items() if f[0] > SECONDS or f[1] > MB}
+    assert not too_much(outcomes)
 
 
 @pytest.mark.slow

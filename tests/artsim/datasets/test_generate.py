@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import os
 import signal
@@ -26,6 +25,7 @@ from artsim.errors import ArtsimError, AssetError, ConfigError, DatasetError
 from artsim.loading.sources import Source, find_sources
 from artsim.model.draws import sample_view
 from artsim.model.kinematics import Array
+from tests.artsim.datasets.troublesome import digests
 from tests.conftest import BOX_LAPTOP, ROOT
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_workers")]
@@ -59,11 +59,6 @@ def made_once(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Source], P
 def make(sources: list[Source], out: Path, **options: object) -> artsim.datasets.generate.GenerateResult:
     defaults = {"num_samples": 60, "sample": OPTIONS, "shard_size": 10, "progress": False, "splits": (1, 1, 1)}
     return artsim.generate(sources, out, **{**defaults, **options})  # type: ignore[arg-type]
-
-
-def digests(folder: Path) -> dict[str, str]:
-    files = [*folder.glob("*.tar"), *folder.glob("objects/*"), folder / "dataset.json", folder / "plan.json"]
-    return {p.relative_to(folder).as_posix(): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
 
 
 def names(folder: Path) -> set[str]:

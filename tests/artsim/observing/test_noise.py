@@ -17,25 +17,7 @@ from artsim.observing.noise import (
     PixelView,
 )
 from artsim.observing.sensor import Sensor
-from tests.artsim.observing.test_sensor import relative_sigma
-
-DEPTHS = (0.6, 1.0, 1.7, 2.5, 4.0)
-
-
-DOWNHILL = np.array([np.cos(0.3), np.sin(0.3), 0.0])
-
-
-def camera(focal: float = 600.0, size: int = 120) -> Camera:
-    K = np.array([[focal, 0.0, size / 2], [0.0, focal, size / 2], [0.0, 0.0, 1.0]])
-    return Camera(K, size, size, np.eye(4))
-
-
-def plane(depth: float, tilt: float, seen_by: Camera) -> Array:
-    """(H, W) depth of a plane that crosses the optical axis at ``depth``, tilted about an oblique axis."""
-    across = seen_by.directions(np.arange(seen_by.width * seen_by.height)) @ DOWNHILL
-    z = depth / (1.0 - across * np.tan(tilt))
-    return z.reshape(seen_by.height, seen_by.width)
-
+from tests.artsim.observing.test_sensor import DEPTHS, DOWNHILL, camera, plane, relative_sigma
 
 STEPS = {
     "jitter": LateralJitter(0.8),

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import os
 import struct
-import subprocess
-import sys
 from typing import Any
 
 import pytest
@@ -22,9 +18,8 @@ from tests.artsim.loading.mesh_builders import (
     two_parts,
     urdf,
 )
-from tests.conftest import ROOT
+from tests.hostile_child import read_each, too_much
 
-SECONDS, MB = 4.0, 500.0  # 2 s on a quiet core; one that is shared takes twice as long, what has no bound minutes
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 SHOW = '<instance_geometry url="#g"/>'
 PLY = "ply\nformat {}\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
@@ -137,16 +132,8 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, An
         folder.mkdir()
         (folder / f"m.{ending}").write_bytes(content.encode() if isinstance(content, str) else content)
         (folder / "mobility.urdf").write_text(robot or urdf(f"m.{ending}"))
-        wanted.append(["load", str(folder)])
-    child = subprocess.run(
-        [sys.executable, "-m", "tests.hostile_child", json.dumps(wanted)],
-        capture_output=True,
-        text=True,
-        cwd=root,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
-    )
-    assert child.returncode == 0, child.stderr
-    return dict(zip(SHAPES, json.loads(child.stdout.splitlines()[-1]), strict=True))
+        wanted.append(("load", folder))
+    return dict(zip(SHAPES, read_each(wanted, root), strict=True))
 
 
 @pytest.mark.slow
@@ -161,5 +148,4 @@ def test_each_is_read_or_refused_in_one_line(outcomes: dict[str, dict[str, Any]]
 
 @pytest.mark.slow
 def test_each_takes_little_time_and_memory(outcomes: dict[str, dict[str, Any]]) -> None:
-    figures = {name: (round(one["seconds"], 2), round(one["mb"])) for name, one in outcomes.items()}
-    assert not {name: f for name, f in figures.items() if f[0] > SECONDS or f[1] > MB}
+    assert not too_much(outcomes)
