@@ -10,7 +10,6 @@ import numpy as np
 from artperl.evaluation.samples import NUM_POINTS, TEST_SEEDS, samples_of
 from artsim.datasets.plan import SampleOptions
 from artsim.datasets.sample_options import SensorName
-from artsim.errors import ConfigError
 from artsim.model.draws import StateMode, StateOptions, ViewOptions, ViewPreset
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.interference import interfere
@@ -67,19 +66,6 @@ CONDITIONS: dict[str, Condition] = {
 """By name, in the order of the table."""
 
 
-def find_condition(name: str) -> Condition:
-    """A condition by its name.
-
-    Raises
-    ------
-    ConfigError
-        When there is none.
-    """
-    if name not in CONDITIONS:
-        raise ConfigError(f"there is no condition {name!r}", "conditions", f"use {', '.join(CONDITIONS)}")
-    return CONDITIONS[name]
-
-
 def condition_samples(name: str, objects: Sequence[ArticulatedObject], views: int) -> list[Sample]:
     """Views of objects under a condition: always the same ones.
 
@@ -92,7 +78,7 @@ def condition_samples(name: str, objects: Sequence[ArticulatedObject], views: in
     views : int
         In all, at least.
     """
-    condition = find_condition(name)
+    condition = CONDITIONS[name]
     options = SampleOptions(
         num_points=condition.num_points, noise=condition.noise, states=StateOptions(condition.states),
         views=ViewOptions(preset=condition.preset),

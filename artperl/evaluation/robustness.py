@@ -10,7 +10,7 @@ import numpy as np
 
 from artperl.evaluation.artimage import OBJECTS, real_objects, row_objects
 from artperl.evaluation.benchmark import find_estimator
-from artperl.evaluation.conditions import CONDITIONS, condition_samples, find_condition
+from artperl.evaluation.conditions import CONDITIONS, condition_samples
 from artperl.evaluation.reliability import confidence_figures, confidence_line
 from artperl.evaluation.scoring import Scored, evaluate, object_symmetries
 from artsim.errors import ConfigError
@@ -64,11 +64,12 @@ def run_robustness(
     ConfigError
         When a source or a condition is unknown, or the file holds figures of other options.
     """
-    for condition in conditions:
-        find_condition(condition)
-    for source in sources:
-        if source not in SOURCES:
-            raise ConfigError(f"there is no source {source!r}", "rows", f"use {', '.join(SOURCES)}")
+    for what, option, told, known in (
+        ("condition", "conditions", conditions, tuple(CONDITIONS)), ("source", "rows", sources, SOURCES)
+    ):  # fmt: skip
+        for name in told:
+            if name not in known:
+                raise ConfigError(f"there is no {what} {name!r}", option, f"use {', '.join(known)}")
     options = {"weights": None if weights is None else str(weights), "objects": objects, "views": views}
     rows, sure = dict(read_kept(kept, options=options).get("rows", {})), {}
     for source in sources:

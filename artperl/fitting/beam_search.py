@@ -17,10 +17,10 @@ from artperl.core.pose import Posed, Theta, pose_parts
 from artperl.core.rotations import rotate, rotation_from_vector
 from artperl.core.shapes import Observed, Shapes
 from artperl.core.trees import Trees
-from artperl.fitting.arrays import State, reference_of, tree_of, view_of
+from artperl.fitting.arrays import reference_of, view_of
 from artperl.fitting.correspondence import Target
 from artperl.fitting.levenberg_marquardt import refine
-from artperl.fitting.match_loops import misfits, pose_each
+from artperl.fitting.match_loops import misfits
 from artperl.fitting.refine_options import RefineOptions
 
 _STATES = 24
@@ -94,14 +94,14 @@ def beam(
     joints, turn = _joint_order(trees)
     theta = _roots(parts[0], start, options) if 0 in parts else start
     cost = torch.zeros_like(theta.translation[:, 0])
-    cost = _misfit(parts, turn == 0, *_poses(shapes, theta), options, cost, width)
+    cost = _misfit(parts, turn == 0, _pose(shapes, theta), options, cost, width)
     for number, joint in enumerate(joints, start=1):
         states = torch.cat([_grid(trees, joint).expand(len(theta), -1), theta.state[:, joint, None]], dim=1)
         theta, cost = theta.repeat(states.shape[1]), cost.repeat_interleave(states.shape[1])
         state = theta.state.clone()
         state[:, joint] = states.flatten()
         theta = replace(theta, state=state)
-        cost = _misfit(parts, turn == number, *_poses(shapes, theta), options, cost, width)
+        cost = _misfit(parts, turn == number, _pose(shapes, theta), options, cost, width)
         best = cost.argsort(stable=True)[:width]
         theta, cost = theta[best], cost[best]
     return theta[:count]
@@ -198,19 +198,10 @@ def _pose(shapes: Shapes, theta: Theta) -> Posed:
     return pose_parts(trees, theta, shapes.box_center)
 
 
-def _poses(shapes: Shapes, theta: Theta) -> tuple[Tensor, Tensor]:
-    """Rotations (B, P, 3, 3) and translations (B, P, 3) of the parts of one reference in B states."""
-    states = (getattr(theta, name).double().contiguous().cpu().numpy() for name in State._fields)
-    found = pose_each(tree_of(shapes, 0), reference_of(shapes, 0).box_center, *states)
-    rotation, translation = (torch.from_numpy(values).to(theta.state) for values in found)
-    return rotation, translation
-
-
 def _misfit(
-    parts: dict[int, _Part], chosen: Tensor, rotation: Tensor, translation: Tensor, options: RefineOptions,
-    before: Tensor, keep: int,
+    parts: dict[int, _Part], chosen: Tensor, posed: Posed, options: RefineOptions, before: Tensor, keep: int
 ) -> Tensor:  # fmt: skip
-    """(B,) misfit of the chosen parts together, in poses (B, P, 3, 3) and (B, P, 3), and what was known before (B,).
+    """(B,) misfit of the chosen parts together, as posed, and what was known before (B,).
 
     Infinite for such as are not among the best, of which so many are kept.
     """
@@ -218,5 +209,5 @@ def _misfit(
     for k in own:
         # Only with the last part it is known which are the best.
         kept = min(keep, len(before)) if k == own[-1] else len(before)
-        total = parts[k].misfit(rotation[:, k], translation[:, k], options, total, kept)
+        total = parts[k].misfit(posed.rotation[:, k], posed.translation[:, k], options, total, kept)
     return total

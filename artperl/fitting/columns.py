@@ -9,6 +9,8 @@ from dataclasses import dataclass
 class Columns:
     """Where each parameter of a step stands, for trees of P rows.
 
+    The first are a turn about the middle of the cloud (3), radians, and a motion (3), metres.
+
     Steps of rigid references end after the states; steps whose axes stay end after the shifts.
 
     Attributes
@@ -18,11 +20,6 @@ class Columns:
     """
 
     num_rows: int
-
-    @property
-    def pose(self) -> slice:
-        """Turn about the middle of the cloud (3), radians, and motion (3), metres."""
-        return slice(6)
 
     @property
     def state(self) -> slice:

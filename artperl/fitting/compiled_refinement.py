@@ -17,9 +17,16 @@ from artperl.core.shapes import Shapes
 from artperl.fitting.arrays import Array, Reference, State, Tree, View, reference_of, state_of, tree_of, view_of
 from artperl.fitting.columns import Columns
 from artperl.fitting.correspondence import Target
-from artperl.fitting.damping import DAMPING, DAMPING_FALL, DAMPING_RISE, LEAST_DAMPING, MOST_DAMPING, RIGID_ITERATIONS
 from artperl.fitting.match_loops import Rows, match, robust_sum
-from artperl.fitting.refine_options import RefineOptions
+from artperl.fitting.refine_options import (
+    DAMPING,
+    DAMPING_FALL,
+    DAMPING_RISE,
+    LEAST_DAMPING,
+    MOST_DAMPING,
+    RIGID_ITERATIONS,
+    RefineOptions,
+)
 from artperl.fitting.shape_prior import ShapePrior
 from artperl.fitting.step_loops import damped_step, normal_equations
 

@@ -115,21 +115,6 @@ def pose(tree: Tree, box_center: Array, state: State) -> Posed:
 
 
 @compiled
-def pose_each(
-    tree: Tree, box_center: Array, rotation: Array, translation: Array, log_scale: Array, state: Array, shift: Array,
-    stretch: Array,
-) -> tuple[Array, Array]:  # fmt: skip
-    """Rotations (B, P, 3, 3) and translations (B, P, 3) of the parts of one object in B states."""
-    B, P = state.shape
-    turned, moved = np.empty((B, P, 3, 3)), np.empty((B, P, 3))
-    for b in range(B):
-        one = State(rotation[b], translation[b], log_scale[b], state[b], shift[b], stretch[b])
-        posed = pose(tree, box_center, one)
-        turned[b], moved[b] = posed.rotation, posed.translation
-    return turned, moved
-
-
-@compiled
 def rotate_about(axis: Array, angle: float, out: Array) -> None:
     """Rodrigues' formula for a unit axis (3,), into (3, 3)."""
     sine, less = np.sin(angle), 1.0 - np.cos(angle)

@@ -14,12 +14,12 @@ from math import comb
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 from torch import Tensor
 
 from artperl.core.clouds import Clouds
 from artperl.core.neighbours import planes, tree_of
 from artperl.perception.network import Perceived, Votes
-from artsim.common.compiled import compiled
 
 Array = NDArray[np.float64]
 
@@ -38,8 +38,6 @@ _MIX /= _MIX.sum()
 """Weights of Chebyshev polynomials T_n that add up to x^100: chances that a walk of 100 steps on a line ends n away,
 hardly ever more than four standard deviations of ten (Sachdeva and Vishnoi 2014, theorem 3.3). The matrix of a step
 takes the place of x, so that 40 products do for 100."""
-_WIDE = 8
-"""Values of a point that are worked on together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,145 +46,41 @@ class Walks:
 
     Attributes
     ----------
-    order : (N,) int64
-        The points as they stand below, those beside one another near each other.
-    first : (N + 1,) int64
-        Where the steps from each point begin.
-    target : (S,) int64
-        Where each step goes.
-    share : (S,) float
-        Of the walks that take it.
-    stay : (N,) float
+    step : (N, N) sparse float
+        Share of the walks at each point that go on to another one.
+    stay : (N, 1) float
         Share of the walks that end at each point.
     """
 
-    order: NDArray[np.int64]
-    first: NDArray[np.int64]
-    target: NDArray[np.int64]
-    share: Array
+    step: csr_matrix
     stay: Array
 
     @staticmethod
     def of(points: Array, diagonal: float) -> Walks:
-        """Walks among points (N, 3) of an object with such a diagonal, in the unit of the points."""
-        tree = tree_of(points)
-        here = points[tree.indices]
-        near = np.argsort(tree.indices)[tree.query(here, range(1, min(_NEIGHBOURS + 1, len(points)) + 1))[1]]
-        return Walks(tree.indices, *_steps(here, near, planes(here, near)[1], _STEP * diagonal))
+        """Walks among points (N, 3) of an object with such a diagonal, in the unit of the points.
+
+        A step to a neighbour counts half if the way back is none to a neighbour.
+        """
+        near = tree_of(points).query(points, range(1, min(_NEIGHBOURS + 1, len(points)) + 1))[1]
+        normal, (N, k) = planes(points, near)[1], (len(near), near.shape[1] - 1)
+        apart, facing = points[near[:, 1:]] - points[:, None], normal[near[:, 1:]]
+        off = np.maximum(*(np.abs((apart * own).sum(axis=2)) for own in (normal[:, None], facing)))
+        crease = 1.0 - np.abs((normal[:, None] * facing).sum(axis=2))
+        weight = np.exp(-((off / (_STEP * diagonal)) ** 2) - crease / _CREASE)
+        one_way = csr_matrix((weight.ravel(), near[:, 1:].ravel(), k * np.arange(N + 1)), shape=(N, N))
+        both = 0.5 * (one_way + one_way.T)
+        total = _STAY + np.asarray(both.sum(axis=1))
+        return Walks(both.multiply(1.0 / total).tocsr(), _STAY / total)
 
     def mean_of_ends(self, values: Array) -> Array:
-        """(N, P) mean of values (N, P) over where walks from each point end."""
-        count, columns = values.shape
-        wide = np.zeros((count, -(-columns // _WIDE) * _WIDE))
-        wide[:, :columns] = values[self.order]
-        _walk(self.first, self.target, self.share, self.stay, wide, _MIX)
-        ends = np.empty_like(values)
-        ends[self.order] = wide[:, :columns]
+        """(N, P) mean of values (N, P) over where walks from each point end: see :data:`_MIX`."""
+        own = self.stay * values
+        last, now = values, own + self.step @ values
+        ends: Array = _MIX[0] * last + _MIX[1] * now
+        for mix in _MIX[2:]:
+            last, now = now, 2.0 * (own + self.step @ now) - last
+            ends += mix * now
         return ends
-
-
-def smooth_labels(points: Array, values: Array, diagonal: float) -> Array:
-    """(N, P) probabilities of parts, or what else is said of each point: the mean over where walks from it end.
-
-    Parameters
-    ----------
-    points : (N, 3) float
-    values : (N, P) float
-        Of each point by itself.
-    diagonal : float
-        Of the object, in the unit of the points.
-    """
-    return Walks.of(points, diagonal).mean_of_ends(values)
-
-
-@compiled
-def _steps(
-    points: Array, near: NDArray[np.int64], normal: Array, step: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array]:
-    """Fields of :class:`Walks`, for points (N, 3), their neighbours (N, 1 + k), themselves first, and normals (N, 3).
-
-    A step to a neighbour counts half if the way back is none to a neighbour.
-    """
-    N, k = len(near), near.shape[1] - 1
-    weight, mutual = np.empty((N, k)), np.empty((N, k), dtype=np.bool_)
-    number = np.zeros(N + 1, dtype=np.int64)
-    for i in range(N):
-        for n in range(k):
-            j = near[i, n + 1]
-            here, there, cosine = 0.0, 0.0, 0.0
-            for axis in range(3):
-                apart = points[j, axis] - points[i, axis]
-                here += normal[i, axis] * apart
-                there += normal[j, axis] * apart
-                cosine += normal[i, axis] * normal[j, axis]
-            off = max(abs(here), abs(there)) / step
-            weight[i, n] = np.exp(-(off * off) - (1.0 - abs(cosine)) / _CREASE)
-            back = False
-            for m in range(k):
-                back |= near[j, m + 1] == i
-            mutual[i, n] = back
-            number[i + 1] += 1
-            if not back:
-                weight[i, n] *= 0.5
-                number[j + 1] += 1
-    first = np.cumsum(number)
-    place = first[:-1].copy()
-    target, share, total = np.empty(first[N], dtype=np.int64), np.empty(first[N]), np.full(N, _STAY)
-    for i in range(N):
-        for n in range(k):
-            j = near[i, n + 1]
-            target[place[i]], share[place[i]] = j, weight[i, n]
-            place[i] += 1
-            total[i] += weight[i, n]
-            if not mutual[i, n]:
-                target[place[j]], share[place[j]] = i, weight[i, n]
-                place[j] += 1
-                total[j] += weight[i, n]
-    for i in range(N):
-        for e in range(first[i], first[i + 1]):
-            share[e] /= total[i]
-    return first, target, share, _STAY / total
-
-
-@compiled
-def _walk(
-    first: NDArray[np.int64], target: NDArray[np.int64], share: Array, stay: Array, values: Array, mix: Array
-) -> None:
-    """Replace values (N, a multiple of 8) by the means over where walks end: see :data:`_MIX`, of which this takes
-    ``mix``."""
-    N = len(values)
-    own, last, now, ends = np.empty((N, _WIDE)), np.empty((N, _WIDE)), np.empty((N, _WIDE)), np.empty((N, _WIDE))
-    for begin in range(0, values.shape[1], _WIDE):
-        for i in range(N):
-            for c in range(_WIDE):
-                value = values[i, begin + c]
-                own[i, c], last[i, c], now[i, c] = stay[i] * value, 0.0, value
-                ends[i, c] = mix[0] * value
-        for n in range(1, len(mix)):
-            twice, less, part = (2.0, 1.0, mix[n]) if n > 1 else (1.0, 0.0, mix[n])
-            for i in range(N):
-                p, q, r, s = own[i, 0], own[i, 1], own[i, 2], own[i, 3]
-                t, u, v, w = own[i, 4], own[i, 5], own[i, 6], own[i, 7]
-                for e in range(first[i], first[i + 1]):
-                    j, weight = target[e], share[e]
-                    p += weight * now[j, 0]
-                    q += weight * now[j, 1]
-                    r += weight * now[j, 2]
-                    s += weight * now[j, 3]
-                    t += weight * now[j, 4]
-                    u += weight * now[j, 5]
-                    v += weight * now[j, 6]
-                    w += weight * now[j, 7]
-                last[i, 0], last[i, 1] = twice * p - less * last[i, 0], twice * q - less * last[i, 1]
-                last[i, 2], last[i, 3] = twice * r - less * last[i, 2], twice * s - less * last[i, 3]
-                last[i, 4], last[i, 5] = twice * t - less * last[i, 4], twice * u - less * last[i, 5]
-                last[i, 6], last[i, 7] = twice * v - less * last[i, 6], twice * w - less * last[i, 7]
-            now, last = last, now
-            if part != 0.0:
-                for i in range(N):
-                    for c in range(_WIDE):
-                        ends[i, c] += part * now[i, c]
-        values[:, begin : begin + _WIDE] = ends
 
 
 def smooth_perceived(

@@ -71,7 +71,7 @@ def part_rates(shapes: Shapes, middle: Tensor, theta: Theta, posed: Posed, rigid
     follow = trees.multiplier[..., None] * functional.one_hot(trees.source, P)
     last = columns.state if rigid else columns.lean if leans else columns.shift
     rates = axis.new_zeros(B, P, 6 if rigid else 9, last.stop)
-    rates[:, :, :6, columns.pose] = torch.eye(6, device=axis.device)
+    rates[:, :, :6, slice(6)] = torch.eye(6, device=axis.device)
     rates[:, :, :6, columns.state] = (carried * lines[:, None]) @ follow[:, None]
     if rigid:
         return rates

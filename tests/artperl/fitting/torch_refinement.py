@@ -14,9 +14,16 @@ from artperl.core.shapes import Shapes
 from artperl.core.trees import Trees
 from artperl.fitting.columns import Columns
 from artperl.fitting.correspondence import TANGENT_WEIGHT, Target
-from artperl.fitting.damping import DAMPING, DAMPING_FALL, DAMPING_RISE, LEAST_DAMPING, MOST_DAMPING, RIGID_ITERATIONS
 from artperl.fitting.levenberg_marquardt import Refined
-from artperl.fitting.refine_options import RefineOptions
+from artperl.fitting.refine_options import (
+    DAMPING,
+    DAMPING_FALL,
+    DAMPING_RISE,
+    LEAST_DAMPING,
+    MOST_DAMPING,
+    RIGID_ITERATIONS,
+    RefineOptions,
+)
 from artperl.fitting.shape_prior import ShapePrior
 from tests.artperl.fitting.torch_jacobian import lean_axes, part_rates, residual_rates, retract
 from tests.artperl.fitting.torch_matches import Matches, match

@@ -10,9 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from artperl.evaluation.artimage import real_objects
-from artperl.perception.label_smoothing import Walks, smooth_labels
+from artperl.perception.label_smoothing import Walks
 from artsim.model.kinematics import Array
 from tests.artperl.worlds import made, view
+
+
+def smooth_labels(points: Array, values: Array, diagonal: float) -> Array:
+    """(N, P) what is said of points (N, 3) of an object with such a diagonal, smoothed."""
+    return Walks.of(points, diagonal).mean_of_ends(values)
 
 
 def guessed(part: Array, parts: int, wrong: float, seed: int) -> Array:
@@ -92,13 +97,9 @@ def test_the_mean_over_ends_is_that_of_a_hundred_steps() -> None:
     """Steps one after the other, by a dense matrix."""
     points, values = plane(300, 0.0, 3), np.random.default_rng(0).random((300, 11))
     walks = Walks.of(points, 1.0)
-    step = np.zeros((300, 300))
-    for i in range(300):
-        here = slice(walks.first[i], walks.first[i + 1])
-        step[i, walks.target[here]] += walks.share[here]
-    np.testing.assert_allclose(step.sum(1) + walks.stay, 1.0)
-    own = values[walks.order]
-    ends = own
+    step = walks.step.toarray()
+    np.testing.assert_allclose(step.sum(1, keepdims=True) + walks.stay, 1.0)
+    ends = values
     for _ in range(100):
-        ends = walks.stay[:, None] * own + step @ ends
-    np.testing.assert_allclose(walks.mean_of_ends(values)[walks.order], ends, atol=1e-4)
+        ends = walks.stay * values + step @ ends
+    np.testing.assert_allclose(walks.mean_of_ends(values), ends, atol=1e-4)
