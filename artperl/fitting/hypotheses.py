@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
 
 import torch
 from torch import Tensor
@@ -105,44 +104,58 @@ class Hypotheses:
         )  # fmt: skip
 
 
-class Best(Protocol):
-    """The best fit so far, of one row: :class:`artperl.fitting.search.Fit`."""
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The best fit to one cloud: records of one row.
 
-    @property
-    def shapes(self) -> Shapes: ...
+    Attributes
+    ----------
+    shapes : Shapes
+    observed : Observed
+        The cloud, labelled by perception and by how near the fitted parts are.
+    start, theta : Theta
+        The hypothesis, and where it ends.
+    row : int
+        Of the base.
+    residual : float
+        Root of the mean robust squared distance from the reference, in diagonals, weighed by part.
+    disagreement : float
+        Median distance between where perception and the fit place the points in the rest frame, over the diagonal.
+    outside : bool
+        Whether the object would be seen from elsewhere than the camera is known to be.
+    """
 
-    @property
-    def theta(self) -> Theta: ...
+    shapes: Shapes
+    observed: Observed
+    start: Theta
+    theta: Theta
+    row: int
+    residual: float
+    disagreement: float
+    outside: bool
 
-    @property
-    def row(self) -> int: ...
-
-    @property
-    def outside(self) -> bool: ...
-
-
-class Generator(Protocol):
-    """Proposes hypotheses for a cloud, given the best fit so far."""
-
-    __name__: str
-
-    def __call__(self, context: Context, best: Best | None) -> Hypotheses | None: ...
+    def to(self, device: torch.device | str) -> Fit:
+        """The fit on another device."""
+        return replace(
+            self, shapes=self.shapes.to(device), observed=self.observed.to(device), start=self.start.to(device),
+            theta=self.theta.to(device),
+        )  # fmt: skip
 
 
-def perceived_pose(context: Context, best: Best | None) -> Hypotheses:
+def perceived_pose(context: Context, best: Fit | None) -> Hypotheses:
     """References where perception places the points in the rest frame."""
     shapes, theta = context.start
     return Hypotheses(shapes, theta, context.references.row.tolist())
 
 
-def hinged_root(context: Context, best: Best | None) -> Hypotheses | None:
+def hinged_root(context: Context, best: Fit | None) -> Hypotheses | None:
     """The first reference, its hardly visible root where the part with most points lets it be."""
     shapes, theta = context.start[0][:1], context.start[1][:1]
     states = initial_pose.starts_by_another_part(context.clouds, context.perceived, shapes, theta, _HINGE_STATES)
     return None if states is None else _of_first(context, shapes, states)
 
 
-def chain_states(context: Context, best: Best | None) -> Hypotheses | None:
+def chain_states(context: Context, best: Fit | None) -> Hypotheses | None:
     """The first reference in the states that a beam search finds, where joints form a chain."""
     options = context.options
     if not context.has_chain:
@@ -155,7 +168,7 @@ def chain_states(context: Context, best: Best | None) -> Hypotheses | None:
     return _of_first(context, shapes, states)
 
 
-def half_turn(context: Context, best: Best | None) -> Hypotheses | None:
+def half_turn(context: Context, best: Fit | None) -> Hypotheses | None:
     """The best fit with a shoulder or a wrist bent the other way."""
     if best is None or not context.options.beam:
         return None
@@ -163,7 +176,7 @@ def half_turn(context: Context, best: Best | None) -> Hypotheses | None:
     return None if states is None else Hypotheses(best.shapes.repeat(len(states)), states, [best.row] * len(states))
 
 
-def other_sides(context: Context, best: Best | None) -> Hypotheses | None:
+def other_sides(context: Context, best: Fit | None) -> Hypotheses | None:
     """The best fit, standing, by quarter turns about its vertical, if it is seen from where the camera is not.
 
     A shut cabinet looks much the same from behind, from its side, and upside down.

@@ -7,7 +7,7 @@ only with a better score.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -21,6 +21,7 @@ from artperl.core.rotations import rotate
 from artperl.core.shapes import Observed, Shapes
 from artperl.fitting.hypotheses import (
     Context,
+    Fit,
     Hypotheses,
     chain_states,
     half_turn,
@@ -40,44 +41,6 @@ _CAMERA_ARC = np.deg2rad(15.0)
 """Arc that a camera may be away from where it is known to be: an estimate need not have it to the degree."""
 _BELOW = np.deg2rad(10.0)
 """Below the horizon, from where no standing object is seen."""
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """The best fit to one cloud: records of one row.
-
-    Attributes
-    ----------
-    shapes : Shapes
-    observed : Observed
-        The cloud, labelled by perception and by how near the fitted parts are.
-    start, theta : Theta
-        The hypothesis, and where it ends.
-    row : int
-        Of the base.
-    residual : float
-        Root of the mean robust squared distance from the reference, in diagonals, weighed by part.
-    disagreement : float
-        Median distance between where perception and the fit place the points in the rest frame, over the diagonal.
-    outside : bool
-        Whether the object would be seen from elsewhere than the camera is known to be.
-    """
-
-    shapes: Shapes
-    observed: Observed
-    start: Theta
-    theta: Theta
-    row: int
-    residual: float
-    disagreement: float
-    outside: bool
-
-    def to(self, device: torch.device | str) -> Fit:
-        """The fit on another device."""
-        return replace(
-            self, shapes=self.shapes.to(device), observed=self.observed.to(device), start=self.start.to(device),
-            theta=self.theta.to(device),
-        )  # fmt: skip
 
 
 def score(residual: Values, outside: Values) -> Values:

@@ -21,11 +21,11 @@ from artperl.core.clouds import Clouds
 from artperl.core.confidence import Calibration, PartCalibration
 from artperl.core.estimate import Estimate, estimate_of_fit, widen
 from artperl.core.threads import steady_torch
-from artperl.fitting.hypotheses import Context
+from artperl.fitting.hypotheses import Context, Fit
 from artperl.fitting.normal_alignment import align_normals
 from artperl.fitting.options import EstimatorOptions
 from artperl.fitting.part_symptoms import part_symptoms
-from artperl.fitting.search import Fit, find_fit
+from artperl.fitting.search import find_fit
 from artperl.methods.many import estimate_many
 from artperl.methods.tracking import track
 from artperl.perception.cloud_checks import cloud_warnings, with_size

@@ -23,9 +23,9 @@ from artperl.core.labels import labels_by_surface
 from artperl.core.pose import Posed, Theta, clamp_state, joint_axes, joint_states, pose_parts
 from artperl.core.shapes import Observed, Shapes
 from artperl.core.threads import steady_torch
+from artperl.fitting.hypotheses import Fit
 from artperl.fitting.levenberg_marquardt import refine
 from artperl.fitting.refine_options import RefineOptions
-from artperl.fitting.search import Fit
 from artperl.perception.preprocess import Cloud
 from artsim.model.kinematics import Array
 from artsim.model.transforms import invert_transform
