@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -55,3 +56,12 @@ def test_options_change_as_an_estimator_is_loaded(base: ShapeBase, tmp_path: Pat
         load_estimator(tmp_path, sene_from=(-75.0, 75.0))
     with pytest.raises(ConfigError, match="LOW HIGH"):
         load_estimator(tmp_path, seen_from=(75.0, -75.0))
+
+
+def test_an_option_of_a_former_version_is_passed_over(base: ShapeBase, tmp_path: Path) -> None:
+    save_estimator(Estimator(Perception(2, 16), base), tmp_path, {})
+    file = tmp_path / "estimator.json"
+    settings = json.loads(file.read_text())
+    settings["options"] = {"occluded_parts": False, "references": 2}
+    file.write_text(json.dumps(settings))
+    assert load_estimator(tmp_path).options == EstimatorOptions(references=2)
