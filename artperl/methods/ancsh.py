@@ -25,19 +25,18 @@ from artperl.fitting.inferred_parts import place_inferred, turn_inferred
 from artperl.fitting.joint_votes import vote_axis, vote_pivot
 from artperl.fitting.kinematic_pairs import couple_rotations
 from artperl.fitting.umeyama import Similarity, ransac_umeyama
+from artperl.methods.protocol import NetworkSizes
 from artperl.perception.ancsh_networks import CoordinateNetwork, JointNetwork
 from artperl.perception.cloud_checks import cloud_warnings, with_size
 from artperl.perception.preprocess import Cloud
 from artperl.retrieval.part_names import part_names
 from artperl.retrieval.shape_base import ShapeBase
 from artsim.common.json_records import from_json_values
-from artsim.model.objects import MAX_PARTS
 
 Array = NDArray[np.float64]
 
 _FEWEST = 6
 """Points of a part below which nothing is fitted to it."""
-_MAX_WIDTH = 2048
 
 
 @dataclass(frozen=True)
@@ -54,18 +53,6 @@ class ANCSHOptions:
     """Of a joint in the optimisation, against the relative error of a part's points."""
     box_quantile: float = 0.98
     """Share of a part's points that its box holds: the others are taken for noise."""
-
-
-@dataclass(frozen=True)
-class ANCSHSizes:
-    """Sizes of the networks."""
-
-    num_rows: int
-    width: int = 48
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.num_rows <= MAX_PARTS or not 1 <= self.width <= _MAX_WIDTH:
-            raise ValueError(f"num_rows is {self.num_rows}, width {self.width}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,13 +211,13 @@ class ANCSH:
 
     def settings(self) -> dict[str, Any]:
         """Sizes and options, in JSON's terms."""
-        sizes = ANCSHSizes(self.joints.num_rows, self.joints.width)
+        sizes = NetworkSizes(self.joints.num_rows, self.joints.width)
         return {"sizes": asdict(sizes), "options": asdict(self.options)}
 
     @classmethod
     def of_settings(cls, settings: dict[str, Any], base: ShapeBase) -> ANCSH:
         """The method with these settings, its networks untrained."""
-        sizes = from_json_values(ANCSHSizes, settings.get("sizes"))
+        sizes = from_json_values(NetworkSizes, settings.get("sizes"))
         options = from_json_values(ANCSHOptions, settings.get("options"))
         return cls(**ancsh_networks(sizes), base=base, options=options)
 
@@ -239,7 +226,7 @@ class ANCSH:
         return ANCSH(self.coordinates.to(device), self.joints.to(device), self.base, self.options)
 
 
-def ancsh_networks(sizes: ANCSHSizes) -> dict[str, Any]:
+def ancsh_networks(sizes: NetworkSizes) -> dict[str, Any]:
     """New networks of these sizes, by name."""
     return {
         "coordinates": CoordinateNetwork(sizes.num_rows, sizes.width),

@@ -24,15 +24,14 @@ from artperl.core.pose import Theta
 from artperl.core.threads import steady_torch
 from artperl.core.trees import Trees
 from artperl.fitting.keypoint_fit import KeypointFit, fit_keypoints, posed_keypoints, snap_keypoints
+from artperl.methods.protocol import NetworkSizes
 from artperl.perception.cloud_checks import cloud_warnings, with_size
 from artperl.perception.omad_networks import CueNetwork, Cues, KeypointPrior, rotation_of_quaternion
 from artperl.perception.preprocess import Cloud
 from artperl.retrieval.part_names import part_names
 from artperl.retrieval.shape_base import ShapeBase
 from artsim.common.json_records import from_json_values
-from artsim.model.objects import MAX_PARTS
 
-_MAX_WIDTH = 2048
 _CENTRAL = 0.02
 """Diagonals from the middle within which a part's box centre lies, in every object, if the part is its own mirror."""
 
@@ -47,18 +46,6 @@ class OMADOptions:
     """Steps of the optimiser, at most."""
     rate: float = 0.01
     """Of Adam."""
-
-
-@dataclass(frozen=True)
-class OMADSizes:
-    """Sizes of the networks."""
-
-    num_rows: int
-    width: int = 48
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.num_rows <= MAX_PARTS or not 1 <= self.width <= _MAX_WIDTH:
-            raise ValueError(f"num_rows is {self.num_rows}, width {self.width}")
 
 
 class OMAD:
@@ -148,12 +135,12 @@ class OMAD:
 
     def settings(self) -> dict[str, Any]:
         """Sizes and options, in JSON's terms."""
-        return {"sizes": asdict(OMADSizes(self.cues.num_rows, self.cues.width)), "options": asdict(self.options)}
+        return {"sizes": asdict(NetworkSizes(self.cues.num_rows, self.cues.width)), "options": asdict(self.options)}
 
     @classmethod
     def of_settings(cls, settings: dict[str, Any], base: ShapeBase) -> OMAD:
         """The method with these settings, its networks untrained."""
-        sizes = from_json_values(OMADSizes, settings.get("sizes"))
+        sizes = from_json_values(NetworkSizes, settings.get("sizes"))
         options = from_json_values(OMADOptions, settings.get("options"))
         return cls(**omad_networks(sizes), base=base, options=options)
 
@@ -162,7 +149,7 @@ class OMAD:
         return OMAD(self.keypoint_prior.to(device), self.cues.to(device), self.base, self.options)
 
 
-def omad_networks(sizes: OMADSizes, base: ShapeBase | None = None) -> dict[str, Any]:
+def omad_networks(sizes: NetworkSizes, base: ShapeBase | None = None) -> dict[str, Any]:
     """New networks of these sizes, by name; the prior begins with the means of a base, if there is one."""
     mirrored, joint = torch.zeros(sizes.num_rows), None
     if base is not None:

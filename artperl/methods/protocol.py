@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 import torch
@@ -11,6 +12,21 @@ from typing_extensions import Self
 
 from artperl.core.estimate import Estimate
 from artperl.retrieval.shape_base import ShapeBase
+from artsim.model.objects import MAX_PARTS
+
+_MAX_WIDTH = 2048
+
+
+@dataclass(frozen=True)
+class NetworkSizes:
+    """Sizes of the networks of a method that learns one kinematic tree: the most parts, and the finest channels."""
+
+    num_rows: int
+    width: int = 48
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.num_rows <= MAX_PARTS or not 1 <= self.width <= _MAX_WIDTH:
+            raise ValueError(f"num_rows is {self.num_rows}, width {self.width}")
 
 
 class Method(Protocol):

@@ -11,7 +11,8 @@ from torch.nn import functional
 from artperl.core.clouds import Clouds
 from artperl.data.truth import Truth
 from artperl.fitting.joint_votes import REACH
-from artperl.methods.ancsh import ANCSH, ANCSHSizes, ancsh_networks
+from artperl.methods.ancsh import ANCSH, ancsh_networks
+from artperl.methods.protocol import NetworkSizes
 from artperl.training.context import Context
 from artperl.training.options import TrainOptions
 from artperl.training.supervised import SupervisedStage
@@ -23,7 +24,7 @@ NPCS, MIOU, NAOCS, PLACE, AXIS, ASSOCIATION = 10.0, 1.0, 1.0, 5.0, 0.2, 1.0
 
 def ancsh_run_networks(options: TrainOptions, num_rows: int) -> dict[str, nn.Module]:
     """New networks of the method, by name."""
-    return ancsh_networks(ANCSHSizes(num_rows, options.width))
+    return ancsh_networks(NetworkSizes(num_rows, options.width))
 
 
 def ancsh_estimator(context: Context) -> ANCSH:

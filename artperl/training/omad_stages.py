@@ -17,7 +17,8 @@ from artperl.core.shapes import Shapes
 from artperl.data.batches import row_batches
 from artperl.data.sources import Source
 from artperl.data.truth import Truth, to_batch
-from artperl.methods.omad import OMAD, OMADSizes, omad_networks, state_range
+from artperl.methods.omad import OMAD, omad_networks, state_range
+from artperl.methods.protocol import NetworkSizes
 from artperl.perception.omad_networks import (
     Cues,
     KeypointPrior,
@@ -48,7 +49,7 @@ _PRIOR_RATE = 3e-3
 
 def omad_run_networks(options: TrainOptions, num_rows: int) -> dict[str, nn.Module]:
     """New networks of the method, by name."""
-    return omad_networks(OMADSizes(num_rows, options.width))
+    return omad_networks(NetworkSizes(num_rows, options.width))
 
 
 def omad_estimator(context: Context) -> OMAD:
@@ -73,7 +74,7 @@ class PriorStage:
         prior, optimizer = context.state.networks["keypoint_prior"], context.state.optimizers["keypoint_prior"]
         assert isinstance(prior, KeypointPrior)
         if first == 0:  # mirrors and mean joints are read from the references, not learnt
-            begun = omad_networks(OMADSizes(context.objects.num_rows, options.width), context.objects.base)
+            begun = omad_networks(NetworkSizes(context.objects.num_rows, options.width), context.objects.base)
             prior.mirrored.copy_(begun["keypoint_prior"].mirrored)
             prior.joint.copy_(begun["keypoint_prior"].joint)
             with torch.no_grad():

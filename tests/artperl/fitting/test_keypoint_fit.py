@@ -14,7 +14,8 @@ from artperl.core.rotations import rotation_from_vector
 from artperl.data.categories import objects_of
 from artperl.evaluation.metrics import rotation_error
 from artperl.fitting.keypoint_fit import fit_keypoints, posed_keypoints, shaped, snap_keypoints
-from artperl.methods.omad import OMADSizes, omad_networks, state_range
+from artperl.methods.omad import omad_networks, state_range
+from artperl.methods.protocol import NetworkSizes
 from artperl.perception.omad_networks import (
     BASIS,
     KeypointPrior,
@@ -28,7 +29,7 @@ from artperl.retrieval.shape_base import ShapeBase
 def prior_of(category: str) -> tuple[KeypointPrior, ShapeBase]:
     base = ShapeBase.of(objects_of([category], 4, 500), 48)
     torch.manual_seed(0)
-    prior = omad_networks(OMADSizes(base.shapes.trees.num_rows, 16), base)["keypoint_prior"]
+    prior = omad_networks(NetworkSizes(base.shapes.trees.num_rows, 16), base)["keypoint_prior"]
     with torch.no_grad():
         prior.mean.add_(base.shapes.box_center.mean(0)[:, None])
     return prior, base

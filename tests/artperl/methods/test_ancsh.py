@@ -14,8 +14,9 @@ from artperl.data.categories import objects_of
 from artperl.data.truth import to_batch, training_rows
 from artperl.evaluation.scoring import Scored, score
 from artperl.inputs.detections import Detection
-from artperl.methods.ancsh import ANCSH, ANCSHSizes, ancsh_networks
+from artperl.methods.ancsh import ANCSH, ancsh_networks
 from artperl.methods.estimator_files import load_estimator, save_estimator
+from artperl.methods.protocol import NetworkSizes
 from artperl.perception.ancsh_networks import CoordinateNetwork, Coordinates, JointNetwork, JointPoints
 from artperl.retrieval.shape_base import ShapeBase
 from artperl.scene.estimator import SceneEstimator
@@ -131,7 +132,7 @@ def test_networks_from_disk_say_what_they_said_and_images_take_the_method_by_its
     """RANSAC on untrained networks may choose other triples: what the networks say is compared, not the poses."""
     torch.manual_seed(0)
     base, sample = ShapeBase.of([artsim.make("laptop", n) for n in range(3)], 32), view(artsim.make("laptop", 5), 2)
-    networks = ancsh_networks(ANCSHSizes(2, 16))
+    networks = ancsh_networks(NetworkSizes(2, 16))
     for network in networks.values():
         network.half().float()  # as precise as files are
     method = ANCSH(**networks, base=base)

@@ -14,7 +14,8 @@ from artperl.data.categories import objects_of
 from artperl.data.sources import DataOptions
 from artperl.data.truth import to_batch
 from artperl.evaluation.metrics import rotation_error
-from artperl.methods.omad import OMAD, OMADOptions, OMADSizes, omad_networks, state_range
+from artperl.methods.omad import OMAD, OMADOptions, omad_networks, state_range
+from artperl.methods.protocol import NetworkSizes
 from artperl.perception.omad_networks import CueNetwork, Cues
 from artperl.retrieval.shape_base import ShapeBase
 from artperl.training.omad_stages import ObjectRows, cue_loss, cue_targets, prior_loss
@@ -25,7 +26,7 @@ from artsim.errors import ConfigError
 def learnt(base: ShapeBase, steps: int = 200) -> OMAD:
     """A method whose prior has learnt the objects of a base."""
     torch.manual_seed(0)
-    networks = omad_networks(OMADSizes(base.shapes.trees.num_rows, 16), base)
+    networks = omad_networks(NetworkSizes(base.shapes.trees.num_rows, 16), base)
     prior, generator = networks["keypoint_prior"], torch.Generator().manual_seed(0)
     with torch.no_grad():
         prior.mean.add_(base.shapes.box_center.mean(0)[:, None])

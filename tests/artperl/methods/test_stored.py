@@ -18,12 +18,12 @@ import artsim
 from artperl.core.estimate import Estimate
 from artperl.evaluation.scoring import evaluate
 from artperl.methods import METHODS, STORED_METHODS, method_of
-from artperl.methods.ancsh import ANCSH, ANCSHSizes, ancsh_networks
+from artperl.methods.ancsh import ANCSH, ancsh_networks
 from artperl.methods.artperl import ArtPERL
 from artperl.methods.estimator_files import load_estimator, save_estimator
 from artperl.methods.full import Estimator
-from artperl.methods.omad import OMAD, OMADOptions, OMADSizes, omad_networks
-from artperl.methods.protocol import Stored
+from artperl.methods.omad import OMAD, OMADOptions, omad_networks
+from artperl.methods.protocol import NetworkSizes, Stored
 from artperl.methods.retrieved import Sizes
 from artperl.methods.sporeagent import SporeAgent
 from artperl.perception.network import Perception
@@ -38,8 +38,8 @@ from tests.artperl.worlds import view
 SIZES = Sizes(2, segmentation=16, siamese=8, policy=8)
 UNTRAINED: dict[str, Callable[[ShapeBase], Stored]] = {
     "artperl": lambda base: ArtPERL(**ArtPERL.new_networks(SIZES), base=base),  # type: ignore[arg-type]
-    "ancsh": lambda base: ANCSH(**ancsh_networks(ANCSHSizes(2, 16)), base=base),
-    "omad": lambda base: OMAD(**omad_networks(OMADSizes(2, 16), base), base=base, options=OMADOptions(iterations=5)),
+    "ancsh": lambda base: ANCSH(**ancsh_networks(NetworkSizes(2, 16)), base=base),
+    "omad": lambda base: OMAD(**omad_networks(NetworkSizes(2, 16), base), base=base, options=OMADOptions(iterations=5)),
     "sporeagent": lambda base: SporeAgent(**SporeAgent.new_networks(SIZES), base=base),  # type: ignore[arg-type]
 }
 FEW = {
