@@ -16,14 +16,12 @@ from artsim.common.palette import PALETTE
 from artsim.datasets.dataset import Dataset
 from artsim.errors import ArtsimError
 from artsim.loading.urdf import load
-from artsim.model.camera import Camera
 from artsim.model.draws import StateOptions, ViewOptions, joint_intervals, sample_state, sample_view
-from artsim.model.frame import BACKGROUND, Frame
+from artsim.model.frame import BACKGROUND
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.annotation import BOX_EDGES, Shown, axis_segment, box_corners, shade_parts
-from artsim.observing.capture import observe
+from artsim.observing.capture import frame_of, observe
 from artsim.observing.sample import Sample
-from artsim.renderers import render
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -78,13 +76,8 @@ def spread(total: int, count: int) -> list[int]:
 
 
 def show_sample(sample: Sample, obj: ArticulatedObject) -> Shown:
-    """A stored sample with its frame: the stored images, or the view rendered again."""
-    if sample.depth is not None and sample.part_mask is not None:
-        frame = Frame(sample.depth, sample.part_mask, rgb=sample.rgb)
-    else:
-        camera = Camera(sample.K, sample.width, sample.height, sample.T_world_camera)
-        frame = render(obj, sample.joint_state, camera, sample.T_world_camera @ sample.T_camera_part[0])
-    return Shown(sample, frame, _title(sample, f"sample {sample.index}"))
+    """A stored sample with its frame."""
+    return Shown(sample, frame_of(sample, obj), _title(sample, f"sample {sample.index}"))
 
 
 def show_states(obj: ArticulatedObject, count: int) -> Iterator[Shown]:
@@ -98,8 +91,7 @@ def show_states(obj: ArticulatedObject, count: int) -> Iterator[Shown]:
         q = obj.tree.complete_state(state)
         camera = sample_view(obj, q, options, rng)
         sample = observe(obj, q, camera, rng=rng)
-        frame = render(obj, q, camera)
-        yield Shown(sample, frame, _title(sample, name))
+        yield Shown(sample, frame_of(sample, obj), _title(sample, name))
 
 
 def _title(sample: Sample, what: str) -> str:

@@ -17,7 +17,7 @@ from artsim.model.objects import ArticulatedObject
 from artsim.observing.noise import Look, PixelView
 from artsim.observing.sample import ARTSIM_VERSION, IMAGES, Sample
 from artsim.observing.sensor import Sensor, find_sensor
-from artsim.renderers import Renderer, ray_kernels, shared_renderer
+from artsim.renderers import Renderer, ray_kernels, render, shared_renderer
 from artsim.renderers.raycast import PosedObject, cast, cast_counted, pose, render_posed, visibility
 
 
@@ -144,6 +144,14 @@ def observe(
 
 
 _FRAME_FIELDS = {"depth": "depth", "part_mask": "part_ids", "rgb": "rgb"}
+
+
+def frame_of(sample: Sample, obj: ArticulatedObject) -> Frame:
+    """The frame of a sample of an object: its images, or the view rendered again."""
+    if sample.depth is not None and sample.part_mask is not None:
+        return Frame(sample.depth, sample.part_mask, rgb=sample.rgb)
+    camera = Camera(sample.K, sample.width, sample.height, sample.T_world_camera)
+    return render(obj, sample.joint_state, camera, sample.T_world_camera @ sample.T_camera_part[0])
 
 
 def _lookup(frame: Frame) -> Look:
