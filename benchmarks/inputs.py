@@ -61,28 +61,18 @@ class Options:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a file.
-
-    Attributes
-    ----------
-    file : Path
-    error : str or None
-        None when it loaded.
-    repairs : tuple of str
-    skipped : str
-        Why it does not count: the format's own library refuses it.
-    parts : int
-        How many were compared with that library.
-    deviation : float
-        Largest difference of an entry of their poses, radians and metres.
-    """
+    """What came of a file."""
 
     file: Path
     error: str | None = None
+    """None when it loaded."""
     repairs: tuple[str, ...] = ()
     skipped: str = ""
+    """Why it does not count: the format's own library refuses it."""
     parts: int = 0
+    """How many were compared with that library."""
     deviation: float = 0.0
+    """Largest difference of an entry of their poses, radians and metres."""
 
     @property
     def format(self) -> str:

@@ -46,26 +46,18 @@ class Options:
 
 @dataclass(frozen=True)
 class Result:
-    """One file of figures.
-
-    Attributes
-    ----------
-    command : str
-        Line of a shell, run in the root of the repository.
-    weights, families : mapping of str to str
-        Digests by name; "all" stands for all families.
-    date, machine : str
-        Empty where it has never run. Of some only the docs that they come from are known.
-    figures : object
-        The last line that the command printed.
-    """
+    """One file of figures."""
 
     command: str
+    """Line of a shell, run in the root of the repository."""
     weights: dict[str, str] = field(default_factory=dict)
     families: dict[str, str] = field(default_factory=dict)
+    """Digests by name; "all" stands for all families."""
     date: str = ""
     machine: str = ""
+    """Empty where it has never run. Of some only the docs that they come from are known."""
     figures: Any = None
+    """The last line that the command printed."""
 
     def today(self) -> Result:
         """The same with the digests of today."""

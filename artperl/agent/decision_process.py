@@ -48,59 +48,47 @@ class View(Batch):
 
     Lengths are in radii of the observed cloud. Places and directions are the root's: from the middle of its box, along
     the axes of its rest frame, as it stands now.
-
-    Attributes
-    ----------
-    observed : (B, N, 3) float
-    part : (B, N) int64
-    gap : (B, N, 3) float
-        From each observed point to the nearest point of the reference's same part that faces the camera; 0 where there
-        is none.
-    gap_normal : (B, N, 3) float
-        Outward normal of the reference there.
-    reference : (B, P, M, 3) float
-    normal : (B, P, M, 3) float
-    shown : (B, P, M) bool
-        Reference points that count, those whose surface faces the camera; of the others everything is 0.
-    reference_gap : (B, P, M, 3) float
-        From each point of the reference to the nearest observed one of its part; 0 where there is none.
-    frame : (B, P, 3, 3) float
-        Axes of the rest frame as each part carries it.
-    axis, anchor : (B, P, 3) float
-        Of each part's joint; the root's are 0.
-    sight : (B, 3) float
-        Unit vector from the camera to the cloud.
-    kind : (B, P) int64
-        Index into ``artperl.core.trees.KINDS``.
-    parent : (B, P) int64
-    valid : (B, P) bool
-    state : (B, P, 2) float
-        Where each joint stands in its range, 0 to 1, and the range itself, in radians or radii (both 0 where it has
-        none).
-    turn : (B, P) bool
-        Parts that act next.
-    left : (B, 1) float
-        Share of the steps that are left.
     """
 
     observed: Tensor
+    """(B, N, 3) float."""
     part: Tensor
+    """(B, N) int64."""
     gap: Tensor
+    """(B, N, 3) float. From each observed point to the nearest point of the reference's same part that faces the
+    camera; 0 where there is none."""
     gap_normal: Tensor
+    """(B, N, 3) float. Outward normal of the reference there."""
     reference: Tensor
+    """(B, P, M, 3) float."""
     normal: Tensor
+    """(B, P, M, 3) float."""
     shown: Tensor
+    """(B, P, M) bool. Reference points that count, those whose surface faces the camera; of the others everything is
+    0."""
     reference_gap: Tensor
+    """(B, P, M, 3) float. From each point of the reference to the nearest observed one of its part; 0 where there is
+    none."""
     frame: Tensor
+    """(B, P, 3, 3) float. Axes of the rest frame as each part carries it."""
     axis: Tensor
     anchor: Tensor
+    """(B, P, 3) float. Of each part's joint; the root's are 0."""
     sight: Tensor
+    """(B, 3) float. Unit vector from the camera to the cloud."""
     kind: Tensor
+    """(B, P) int64. Index into ``artperl.core.trees.KINDS``."""
     parent: Tensor
+    """(B, P) int64."""
     valid: Tensor
+    """(B, P) bool."""
     state: Tensor
+    """(B, P, 2) float. Where each joint stands in its range, 0 to 1, and the range itself, in radians or radii (both 0
+    where it has none)."""
     turn: Tensor
+    """(B, P) bool. Parts that act next."""
     left: Tensor
+    """(B, 1) float. Share of the steps that are left."""
 
 
 class Fitting:

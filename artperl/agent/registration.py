@@ -84,23 +84,15 @@ class RegistrationPolicy(nn.Module):
 
 @dataclass(frozen=True, eq=False)
 class PartProblems(Batch):
-    """Registration problems of single parts, R rows.
-
-    Attributes
-    ----------
-    shapes : Shapes
-        Of one part each.
-    observed : Observed
-    start : Theta
-    row, part : (R,) int64
-        Of which object, and which of its parts.
-    """
+    """Registration problems of single parts, R rows."""
 
     shapes: Shapes
+    """Of one part each."""
     observed: Observed
     start: Theta
     row: Tensor
     part: Tensor
+    """(R,) int64. Of which object, and which of its parts."""
 
 
 def part_problems(shapes: Shapes, observed: Observed, theta: Theta, generator: torch.Generator) -> PartProblems | None:

@@ -40,37 +40,28 @@ class Evidence(Batch):
     """What B clouds tell about boxes of P parts. Rest frame of the estimated object, in diagonals of it.
 
     Faces are -x, -y, -z, +x, +y, +z.
-
-    Attributes
-    ----------
-    center, size : (B, P, 3) float
-        Boxes as the fitted reference has them, widened to hold the points.
-    valid : (B, P) bool
-    candidates : (B, P, 6, C) float
-        How far out of each face of these boxes it may be instead: not at all; at the part's :data:`SHARES` of points;
-        at all points; where perception has it; where the part would end, from its outermost point opposite, if it were
-        as large as perceived, or as the reference; at its siblings' points; and at the root's.
-    facing : (B, P, 6) float
-        Cosine of the angle between the outward normal and the direction to the camera.
-    perceived_size : (B, P, 3) float
-    axis : (B, P, 3) float
-        Unit vector along which it slides; 0 for parts that turn.
-    share : (B, P) float
-        Of the points.
-    roughness : (B,) float
-        How far points lie from planes through their neighbours, in the middle: what a sensor's noise leaves there, so
-        that outermost points are to be trusted less.
     """
 
     center: Tensor
     size: Tensor
+    """(B, P, 3) float. Boxes as the fitted reference has them, widened to hold the points."""
     valid: Tensor
+    """(B, P) bool."""
     candidates: Tensor
+    """(B, P, 6, C) float. How far out of each face of these boxes it may be instead: not at all; at the part's
+    :data:`SHARES` of points; at all points; where perception has it; where the part would end, from its outermost point
+    opposite, if it were as large as perceived, or as the reference; at its siblings' points; and at the root's."""
     facing: Tensor
+    """(B, P, 6) float. Cosine of the angle between the outward normal and the direction to the camera."""
     perceived_size: Tensor
+    """(B, P, 3) float."""
     axis: Tensor
+    """(B, P, 3) float. Unit vector along which it slides; 0 for parts that turn."""
     share: Tensor
+    """(B, P) float. Of the points."""
     roughness: Tensor
+    """(B,) float. How far points lie from planes through their neighbours, in the middle: what a sensor's noise leaves
+    there, so that outermost points are to be trusted less."""
 
     @staticmethod
     def of(
@@ -180,28 +171,19 @@ def _siblings(outermost: Tensor, seen: Tensor) -> Tensor:
 
 @dataclass(frozen=True, eq=False)
 class BoxContext:
-    """What tells about the boxes of one fitted cloud, besides its estimate.
-
-    Attributes
-    ----------
-    points : (N, 3) float
-        Camera frame, metres.
-    log_odds : (N, P) float
-        Of each point to be of each part; NaN for outliers.
-    box_center, box_size : (P, 3) float
-        As perceived, in the rest frame, metres.
-    some : (M,) int64
-        Points by which faces of boxes are looked for.
-    roughness : () float
-        Of these, metres.
-    """
+    """What tells about the boxes of one fitted cloud, besides its estimate."""
 
     points: Array
+    """(N, 3) float. Camera frame, metres."""
     log_odds: Array
+    """(N, P) float. Of each point to be of each part; NaN for outliers."""
     box_center: Tensor
     box_size: Tensor
+    """(P, 3) float. As perceived, in the rest frame, metres."""
     some: NDArray[np.int64]
+    """(M,) int64. Points by which faces of boxes are looked for."""
     roughness: Tensor
+    """() float. Of these, metres."""
 
     @staticmethod
     def of(cloud: Cloud, clouds: Clouds, perceived: Perceived) -> BoxContext:

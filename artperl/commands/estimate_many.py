@@ -28,31 +28,20 @@ _NAMED = 8
 
 @dataclass(frozen=True)
 class Entry:
-    """One cloud.
-
-    Attributes
-    ----------
-    file : Path
-    sample : str or None
-        Key of a sample, where the file is a shard; None of one that cannot be read.
-    """
+    """One cloud."""
 
     file: Path
     sample: str | None = None
+    """Key of a sample, where the file is a shard; None of one that cannot be read."""
 
 
 @dataclass(frozen=True)
 class Clouds:
-    """Clouds in files, and in shards of datasets.
-
-    Attributes
-    ----------
-    files, shards : tuple of Path
-        The first hold one cloud each.
-    """
+    """Clouds in files, and in shards of datasets."""
 
     files: tuple[Path, ...]
     shards: tuple[Path, ...]
+    """The first hold one cloud each."""
 
     @staticmethod
     def of(paths: Sequence[Path], options: InputOptions, apart: Iterable[Path | None]) -> Clouds:
@@ -134,18 +123,12 @@ def _reader_since(shard: Path, changed: int) -> ShardReader:
 
 @dataclass(frozen=True)
 class Estimating:
-    """Makes, in each process, the function that gives the record of an entry.
-
-    Attributes
-    ----------
-    load : callable
-        Gives the estimator.
-    options : InputOptions
-        Of files; samples of shards are in metres in the camera frame.
-    """
+    """Makes, in each process, the function that gives the record of an entry."""
 
     load: Callable[[], Method]
+    """Gives the estimator."""
     options: InputOptions
+    """Of files; samples of shards are in metres in the camera frame."""
 
     def __call__(self) -> Callable[[Entry], dict[str, Any]]:
         return _Recorder(self.load(), self.options)

@@ -20,31 +20,22 @@ _NAMED = {"revolute", "continuous", "prismatic", "free"}
 
 @dataclass(frozen=True, eq=False)
 class CategoryPrior:
-    """Of K parts; lengths in diagonals, rest frame.
-
-    Attributes
-    ----------
-    kinds : tuple of str, length K
-        Types of the joints, "free" for the root.
-    parents : (K,) int64
-        -1 for the root.
-    rest : (K,) float
-    limits : (K, 2) float
-        As wide as those of any object.
-    axis, origin : (K, 3) float
-        Means.
-    box_center, box_size : (K, 3) float
-        Means.
-    """
+    """Of K parts; lengths in diagonals, rest frame."""
 
     kinds: tuple[str, ...]
+    """Types of the joints, "free" for the root."""
     parents: NDArray[np.int64]
+    """(K,) int64. -1 for the root."""
     rest: Array
+    """(K,) float."""
     limits: Array
+    """(K, 2) float. As wide as those of any object."""
     axis: Array
     origin: Array
+    """(K, 3) float. Means."""
     box_center: Array
     box_size: Array
+    """(K, 3) float. Means."""
 
     def __len__(self) -> int:
         return len(self.kinds)

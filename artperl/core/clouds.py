@@ -19,21 +19,14 @@ _FARTHEST = 1e9
 
 @dataclass(frozen=True, eq=False)
 class Clouds(Batch):
-    """B partial clouds of N points, brought to a common place and size.
-
-    Attributes
-    ----------
-    points : (B, N, 3) float
-        ``(camera-frame points - center) / scale``, in random order.
-    center : (B, 3) float
-        Mean of the points, metres, camera frame.
-    scale : (B,) float
-        Root of the mean squared distance from it, times two, metres.
-    """
+    """B partial clouds of N points, brought to a common place and size."""
 
     points: Tensor
+    """(B, N, 3) float. ``(camera-frame points - center) / scale``, in random order."""
     center: Tensor
+    """(B, 3) float. Mean of the points, metres, camera frame."""
     scale: Tensor
+    """(B,) float. Root of the mean squared distance from it, times two, metres."""
 
     @staticmethod
     def of(points: Tensor) -> Clouds:

@@ -12,48 +12,33 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Symptoms:
-    """What an estimate says about itself, by which confidence judges it.
-
-    Attributes
-    ----------
-    residual, disagreement, expected_error, outlier_share : float
-        As in :class:`artperl.core.estimate.Estimate`; the worse, the higher.
-    visibility : float
-        Of the part that shows least; the better, the higher.
-    """
+    """What an estimate says about itself, by which confidence judges it."""
 
     residual: float = np.inf
     disagreement: float = np.inf
     visibility: float = 0.0
+    """Of the part that shows least; the better, the higher."""
     expected_error: float = np.inf
     outlier_share: float = 0.0
+    """As in :class:`artperl.core.estimate.Estimate`; the worse, the higher."""
 
 
 @dataclass(frozen=True, eq=False)
 class PartSymptoms:
-    """What an estimate says about each of its K parts.
-
-    Attributes
-    ----------
-    disagreement : (K,) float
-        Median distance between where perception and the fit place the part's points in the rest frame, in diagonals; of
-        the method artperl, between where the two best ends do.
-    expected_error : (K,) float
-        Median error that perception expects of these places, in diagonals; of the method artperl, median probability
-        that their label is wrong.
-    certainty : (K,) float
-        Mean probability, by perception, that the part's points are of it.
-    visibility : (K,) float
-        Share of the part's surface that is seen.
-    points : (K,) float
-        Root of the share of the cloud's points that are of the part.
-    """
+    """What an estimate says about each of its K parts."""
 
     disagreement: Array = field(default_factory=lambda: np.zeros(0))
+    """(K,) float. Median distance between where perception and the fit place the part's points in the rest frame, in
+    diagonals; of the method artperl, between where the two best ends do."""
     expected_error: Array = field(default_factory=lambda: np.zeros(0))
+    """(K,) float. Median error that perception expects of these places, in diagonals; of the method artperl, median
+    probability that their label is wrong."""
     certainty: Array = field(default_factory=lambda: np.zeros(0))
+    """(K,) float. Mean probability, by perception, that the part's points are of it."""
     visibility: Array = field(default_factory=lambda: np.zeros(0))
+    """(K,) float. Share of the part's surface that is seen."""
     points: Array = field(default_factory=lambda: np.zeros(0))
+    """(K,) float. Root of the share of the cloud's points that are of the part."""
 
     @property
     def table(self) -> Array:

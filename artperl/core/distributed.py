@@ -25,19 +25,13 @@ _PATIENCE = timedelta(hours=6)
 
 @dataclass(frozen=True)
 class Ranks:
-    """This process among those of a run.
-
-    Attributes
-    ----------
-    rank, count : int
-        Its number, and how many there are. The first alone writes.
-    control : process group or None
-        For what is not gradients: records, clouds.
-    """
+    """This process among those of a run."""
 
     rank: int = 0
     count: int = 1
+    """Its number, and how many there are. The first alone writes."""
     control: Any = None
+    """For what is not gradients: records, clouds."""
 
     @staticmethod
     def started(device: str) -> tuple[Ranks, torch.device]:

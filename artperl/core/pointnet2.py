@@ -48,20 +48,15 @@ def exact(function: Callable[P, R]) -> Callable[P, R]:
 
 @dataclass(frozen=True)
 class Neighbourhoods:
-    """Neighbours in B clouds at every level. Level 0 is the cloud itself; level l has ``sizes[l]`` of its points.
-
-    Attributes
-    ----------
-    points : list of (B, N_l, 3) float
-    down : list of (B, N_l+1, k) int64
-        For each centre of level l + 1, its nearest points of level l.
-    up : list of pairs (B, N_l, 3) float and (B, N_l, 3) int64
-        For each point of level l, its three nearest centres of level l + 1, and weights that fall with distance.
-    """
+    """Neighbours in B clouds at every level. Level 0 is the cloud itself; level l has ``sizes[l]`` of its points."""
 
     points: list[Tensor]
+    """list of (B, N_l, 3) float."""
     down: list[Tensor]
+    """list of (B, N_l+1, k) int64. For each centre of level l + 1, its nearest points of level l."""
     up: list[tuple[Tensor, Tensor]]
+    """list of pairs (B, N_l, 3) float and (B, N_l, 3) int64. For each point of level l, its three nearest centres of
+    level l + 1, and weights that fall with distance."""
 
     @staticmethod
     @torch.no_grad()

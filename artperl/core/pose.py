@@ -26,30 +26,22 @@ from artperl.core.trees import Trees
 
 @dataclass(frozen=True, eq=False)
 class Theta(Batch):
-    """Joint-centric state of B objects.
-
-    Attributes
-    ----------
-    rotation : (B, 3, 3) float
-        Of the root: rest frame -> camera.
-    translation : (B, 3) float
-        Of the root, metres.
-    log_scale : (B, 3) float
-        Logarithm of the scale of the whole reference along the axes of its rest frame.
-    state : (B, P) float
-        Radians, or lengths in the reference's units. Entries of the root, of followers and of padding are ignored.
-    shift : (B, P, 3) float
-        Of each joint's anchor, in the rest frame; what hangs from it moves along. The root's entry is ignored.
-    stretch : (B, P, 3) float
-        Logarithm of each part's own scale, besides that of the whole.
-    """
+    """Joint-centric state of B objects."""
 
     rotation: Tensor
+    """(B, 3, 3) float. Of the root: rest frame -> camera."""
     translation: Tensor
+    """(B, 3) float. Of the root, metres."""
     log_scale: Tensor
+    """(B, 3) float. Logarithm of the scale of the whole reference along the axes of its rest frame."""
     state: Tensor
+    """(B, P) float. Radians, or lengths in the reference's units. Entries of the root, of followers and of padding are
+    ignored."""
     shift: Tensor
+    """(B, P, 3) float. Of each joint's anchor, in the rest frame; what hangs from it moves along. The root's entry is
+    ignored."""
     stretch: Tensor
+    """(B, P, 3) float. Logarithm of each part's own scale, besides that of the whole."""
 
     @staticmethod
     def at_rest(trees: Trees) -> Theta:
@@ -62,29 +54,20 @@ class Theta(Batch):
 
 @dataclass(frozen=True, eq=False)
 class Posed(Batch):
-    """Where Theta puts the parts. ``p_camera = rotation @ (center_rest + scale * (x - c)) + translation``.
-
-    Attributes
-    ----------
-    rotation : (B, P, 3, 3) float
-    translation : (B, P, 3) float
-        ``T_camera_part``: the adapted rest frame, as carried by each part -> camera.
-    center_rest : (B, P, 3) float
-        Box centres in the adapted rest frame.
-    origin_rest : (B, P, 3) float
-        Anchors of the joints in the adapted rest frame, at rest.
-    scale : (B, P, 3) float
-        Of each part, about its box centre.
-    reach : (B, P) float
-        See :func:`reach`.
-    """
+    """Where Theta puts the parts. ``p_camera = rotation @ (center_rest + scale * (x - c)) + translation``."""
 
     rotation: Tensor
+    """(B, P, 3, 3) float."""
     translation: Tensor
+    """(B, P, 3) float. ``T_camera_part``: the adapted rest frame, as carried by each part -> camera."""
     center_rest: Tensor
+    """(B, P, 3) float. Box centres in the adapted rest frame."""
     origin_rest: Tensor
+    """(B, P, 3) float. Anchors of the joints in the adapted rest frame, at rest."""
     scale: Tensor
+    """(B, P, 3) float. Of each part, about its box centre."""
     reach: Tensor
+    """(B, P) float. See :func:`reach`."""
 
     @property
     def center(self) -> Tensor:
@@ -262,15 +245,10 @@ def _into_limits(trees: Trees, state: Tensor) -> Tensor:
 
 @dataclass(frozen=True, eq=False)
 class AxisPrior(Batch):
-    """How the axes of an object's hinges may lean away from its reference's, of B objects.
-
-    Attributes
-    ----------
-    covariance : (B, 3 P, 3 P) float
-        Of the rotation vectors that take the reference's axes to the object's: axes may well lean together.
-    leans : (B, P) bool
-        Joints whose axes lean at all.
-    """
+    """How the axes of an object's hinges may lean away from its reference's, of B objects."""
 
     covariance: Tensor
+    """(B, 3 P, 3 P) float. Of the rotation vectors that take the reference's axes to the object's: axes may well lean
+    together."""
     leans: Tensor
+    """(B, P) bool. Joints whose axes lean at all."""

@@ -20,28 +20,19 @@ from artsim.model.objects import ArticulatedObject
 
 @dataclass(frozen=True, eq=False)
 class Shapes(Batch):
-    """B reference objects in their rest frames, in metres or any other unit of their own.
-
-    Attributes
-    ----------
-    trees : Trees
-    box_center, box_size : (B, P, 3) float
-        Of each part; padding has no size.
-    points, normals : (B, P, M, 3) float
-        Points spread evenly over each part's surface, and its outward unit normals there.
-    spacing : (B, P) float
-        Typical distance between neighbouring points of a part; infinite for parts without a surface.
-    diagonal : (B,) float
-        Of the box of the whole object at rest.
-    """
+    """B reference objects in their rest frames, in metres or any other unit of their own."""
 
     trees: Trees
     box_center: Tensor
     box_size: Tensor
+    """(B, P, 3) float. Of each part; padding has no size."""
     points: Tensor
     normals: Tensor
+    """(B, P, M, 3) float. Points spread evenly over each part's surface, and its outward unit normals there."""
     spacing: Tensor
+    """(B, P) float. Typical distance between neighbouring points of a part; infinite for parts without a surface."""
     diagonal: Tensor
+    """(B,) float. Of the box of the whole object at rest."""
 
     @property
     def has_surface(self) -> Tensor:
@@ -94,21 +85,14 @@ class Shapes(Batch):
 
 @dataclass(frozen=True, eq=False)
 class Observed(Batch):
-    """B observed clouds of N points in the camera frame (the camera at the origin), segmented into parts.
-
-    Attributes
-    ----------
-    points : (B, N, 3) float
-        Metres.
-    part : (B, N) int64
-        Part of each point.
-    weight : (B, N) float
-        How much each point counts; 0 for padding and outliers.
-    """
+    """B observed clouds of N points in the camera frame (the camera at the origin), segmented into parts."""
 
     points: Tensor
+    """(B, N, 3) float. Metres."""
     part: Tensor
+    """(B, N) int64. Part of each point."""
     weight: Tensor
+    """(B, N) float. How much each point counts; 0 for padding and outliers."""
 
     @staticmethod
     def of(points: Tensor, part: Tensor, weight: Tensor | None = None) -> Observed:

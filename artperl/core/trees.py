@@ -20,48 +20,37 @@ KINDS = (*JOINT_TYPES, "fixed")
 
 @dataclass(frozen=True, eq=False)
 class Trees(Batch):
-    """B kinematic trees of at most P parts. Axes and origins are in the rest frame, at rest, in the objects' units.
-
-    Attributes
-    ----------
-    valid : (B, P) bool
-        Rows that are parts.
-    kind : (B, P) int64
-        Index into ``KINDS``.
-    parent : (B, P) int64
-        The root, and rows that pad, name the root.
-    axis, origin : (B, P, 3) float
-    lower, upper, rest : (B, P) float
-        Radians, or lengths; infinite limits where a joint turns freely.
-    turn, slide : (B, P) float
-        Radians about the axis and lengths along it, per unit of state.
-    source : (B, P) int64
-    multiplier, offset : (B, P) float
-        ``state[k] = multiplier[k] * state[source[k]] + offset[k]``: joints that follow another; others name themselves.
-    free : (B, P) bool
-        Joints whose state is to be found: not the root, no follower, not fixed.
-    carries : (B, P, P) bool
-        ``carries[j, k]``: joint j moves part k. The root's joint is left out, since it moves every part.
-    depth : (B, P) int64
-        Joints between each part and the root.
-    """
+    """B kinematic trees of at most P parts. Axes and origins are in the rest frame, at rest, in the objects' units."""
 
     valid: Tensor
+    """(B, P) bool. Rows that are parts."""
     kind: Tensor
+    """(B, P) int64. Index into ``KINDS``."""
     parent: Tensor
+    """(B, P) int64. The root, and rows that pad, name the root."""
     axis: Tensor
     origin: Tensor
+    """(B, P, 3) float."""
     lower: Tensor
     upper: Tensor
     rest: Tensor
+    """(B, P) float. Radians, or lengths; infinite limits where a joint turns freely."""
     turn: Tensor
     slide: Tensor
+    """(B, P) float. Radians about the axis and lengths along it, per unit of state."""
     source: Tensor
+    """(B, P) int64."""
     multiplier: Tensor
     offset: Tensor
+    """(B, P) float. ``state[k] = multiplier[k] * state[source[k]] + offset[k]``: joints that follow another; others
+    name themselves."""
     free: Tensor
+    """(B, P) bool. Joints whose state is to be found: not the root, no follower, not fixed."""
     carries: Tensor
+    """(B, P, P) bool. ``carries[j, k]``: joint j moves part k. The root's joint is left out, since it moves every
+    part."""
     depth: Tensor
+    """(B, P) int64. Joints between each part and the root."""
 
     @property
     def num_rows(self) -> int:

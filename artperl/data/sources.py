@@ -246,36 +246,24 @@ Source = Samples | Recorded | Given
 
 @dataclass(frozen=True, eq=False)
 class DataOptions:
-    """What there is to learn from, and how it is seen.
-
-    Attributes
-    ----------
-    categories : sequence of str
-        Procedural categories; empty to learn from the given objects alone.
-    parts : Parts
-    given : sequence of ArticulatedObject
-        Every other object is one of these, if there are any.
-    dataset : str or Path, optional
-        Folder of a dataset to learn from instead.
-    sample : SampleOptions
-        View preset, noise and the like.
-    stretched : float
-        Share of the training clouds whose objects are stretched; see :func:`artperl.data.stretching.stretch`.
-    noisy : float
-        Share of the other training clouds that are as a depth sensor sees them, one of
-        :data:`artperl.data.batches.SENSORS`.
-    degraded : float
-        Share of all training clouds that are cut, dirty or sparse; see :func:`artperl.data.degrading.degrade`.
-    """
+    """What there is to learn from, and how it is seen."""
 
     categories: Sequence[str] = ()
+    """Procedural categories; empty to learn from the given objects alone."""
     parts: Parts = "artimage"
     given: Sequence[ArticulatedObject] = ()
+    """Every other object is one of these, if there are any."""
     dataset: str | Path | None = None
+    """Folder of a dataset to learn from instead."""
     sample: SampleOptions = field(default_factory=SampleOptions)
+    """View preset, noise and the like."""
     stretched: float = 0.0
+    """Share of the training clouds whose objects are stretched; see :func:`artperl.data.stretching.stretch`."""
     noisy: float = 0.0
+    """Share of the other training clouds that are as a depth sensor sees them, one of
+    :data:`artperl.data.batches.SENSORS`."""
     degraded: float = 0.0
+    """Share of all training clouds that are cut, dirty or sparse; see :func:`artperl.data.degrading.degrade`."""
 
     def source(self, num_rows: int, num_points: int, seed: int, views_per_object: int) -> Source:
         """Samples by number.

@@ -17,38 +17,27 @@ from artsim.observing.sample import Sample
 
 @dataclass(frozen=True, eq=False)
 class Truth(Batch):
-    """What is true of B clouds. Lengths of the rest frame are in diagonals of the object.
-
-    Attributes
-    ----------
-    part : (B, N) int64
-        0 for points that are not of the object.
-    own : (B, N) bool
-        Whether a point is of the object.
-    canonical : (B, N, 3) float
-        Where each point lies in the rest frame, at rest; 0 for points that are not of the object.
-    part_valid : (B, P) bool
-    box_center, box_size : (B, P, 3) float
-    joint : (B, P, 9) float
-        See :func:`joint_rows`.
-    level : (B, P) int64
-        How many joints are between the root and the part.
-    parent : (B, P) int64
-        The root, and rows that pad, name the root.
-    diagonal : (B,) float
-        Over the cloud's scale.
-    """
+    """What is true of B clouds. Lengths of the rest frame are in diagonals of the object."""
 
     part: Tensor
+    """(B, N) int64. 0 for points that are not of the object."""
     own: Tensor
+    """(B, N) bool. Whether a point is of the object."""
     canonical: Tensor
+    """(B, N, 3) float. Where each point lies in the rest frame, at rest; 0 for points that are not of the object."""
     part_valid: Tensor
+    """(B, P) bool."""
     box_center: Tensor
     box_size: Tensor
+    """(B, P, 3) float."""
     joint: Tensor
+    """(B, P, 9) float. See :func:`joint_rows`."""
     level: Tensor
+    """(B, P) int64. How many joints are between the root and the part."""
     parent: Tensor
+    """(B, P) int64. The root, and rows that pad, name the root."""
     diagonal: Tensor
+    """(B,) float. Over the cloud's scale."""
 
     def of_points(self, rows: Tensor) -> Tensor:
         """(B, N, ...) of each point's part, from (B, P, ...) of each part."""

@@ -113,24 +113,16 @@ class Detector:
 
 @dataclass(frozen=True, eq=False)
 class _Answer:
-    """What the network says of those n cells or pixels of an image that it takes for objects.
-
-    Attributes
-    ----------
-    there : (H, W) bool
-        Which those are.
-    shares : (1 + C, n) float32
-        Probability of each category, none first.
-    votes : (n, 3) float32
-        For the middle of the object, in the unit of the look.
-    sizes : (n,) float32
-        Diagonal of the object.
-    """
+    """What the network says of those n cells or pixels of an image that it takes for objects."""
 
     there: NDArray[np.bool_]
+    """(H, W) bool. Which those are."""
     shares: NDArray[np.float32]
+    """(1 + C, n) float32. Probability of each category, none first."""
     votes: NDArray[np.float32]
+    """(n, 3) float32. For the middle of the object, in the unit of the look."""
     sizes: NDArray[np.float32]
+    """(n,) float32. Diagonal of the object."""
 
     @staticmethod
     def of(shares: Tensor, told: Tensor, points: NDArray[np.float32]) -> _Answer:

@@ -38,20 +38,15 @@ _ABOVE = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """An image as the network sees it.
-
-    Attributes
-    ----------
-    channels : (8, H, W) float32
-    points : (H, W, 3) float32
-        Camera frame, metres; where nothing was measured, as far away as the nearest pixel that was.
-    unit : float
-        Median depth in metres: lengths that the network tells are in this unit.
-    """
+    """An image as the network sees it."""
 
     channels: Array
+    """(8, H, W) float32."""
     points: Array
+    """(H, W, 3) float32. Camera frame, metres; where nothing was measured, as far away as the nearest pixel that
+    was."""
     unit: float
+    """Median depth in metres: lengths that the network tells are in this unit."""
 
 
 def look_at(rgb: NDArray[np.uint8] | None, depth: ArrayLike, K: ArrayLike, width: int = LOOK_WIDTH) -> Look:

@@ -28,20 +28,13 @@ learns something else than it is tested with."""
 
 @dataclass(frozen=True)
 class DetectorSize:
-    """What the shape of the network follows from.
-
-    Attributes
-    ----------
-    categories : tuple of str
-    width : int
-        Channels of the finest level of the ResNet; each coarser level has twice as many.
-    blocks : int
-        Residual blocks of each of the four levels.
-    """
+    """What the shape of the network follows from."""
 
     categories: tuple[str, ...]
     width: int = 32
+    """Channels of the finest level of the ResNet; each coarser level has twice as many."""
     blocks: int = 2
+    """Residual blocks of each of the four levels."""
 
 
 class DetectorNetwork(nn.Module):

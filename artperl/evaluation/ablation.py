@@ -83,16 +83,11 @@ def permute_references(base: ShapeBase) -> ShapeBase:
 
 @dataclass(frozen=True)
 class Loss:
-    """How much worse the means of one category and source are without a stage.
-
-    Attributes
-    ----------
-    mean, error : dict of float
-        Of the paired differences, worse is positive, and their standard errors; keys of :data:`MARGINS`.
-    """
+    """How much worse the means of one category and source are without a stage."""
 
     mean: dict[str, float]
     error: dict[str, float]
+    """Of the paired differences, worse is positive, and their standard errors; keys of :data:`MARGINS`."""
 
     @property
     def large(self) -> list[str]:

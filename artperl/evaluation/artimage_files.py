@@ -66,28 +66,20 @@ _SEEN = 0.03
 
 @dataclass(frozen=True, eq=False)
 class ArtImageObject:
-    """What the files of one object say, in their axes, lengths in their unit. K parts, the root first.
-
-    Attributes
-    ----------
-    surface : list of (n, 3) float, length K
-        Points of each part, in the rest state.
-    T_rest_zero : (K, 4, 4) float
-        From the file's zero to the rest state.
-    kinds : tuple of str, length K
-    parents : (K,) int64
-    axis, origin : (K, 3) float
-    limits : (K, 2) float
-        Of the joints, from the rest state on.
-    """
+    """What the files of one object say, in their axes, lengths in their unit. K parts, the root first."""
 
     surface: list[Array]
+    """list of (n, 3) float, length K. Points of each part, in the rest state."""
     T_rest_zero: Array
+    """(K, 4, 4) float. From the file's zero to the rest state."""
     kinds: tuple[str, ...]
     parents: NDArray[np.int64]
+    """(K,) int64."""
     axis: Array
     origin: Array
+    """(K, 3) float."""
     limits: Array
+    """(K, 2) float. Of the joints, from the rest state on."""
 
     @property
     def bounds(self) -> tuple[Array, Array]:

@@ -29,30 +29,21 @@ Right = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class PosedObject:
-    """Parts of an object in an image, the root first. Camera frame, metres.
-
-    Attributes
-    ----------
-    image, category : str
-    rotation : (K, 3, 3) float
-    center, size : (K, 3) float
-        Of the posed boxes.
-    score : float
-        Of a found object.
-    counted : bool
-        Of a true object: whether it is to be found. Who finds another one neither wins nor loses.
-    equals : tuple of PosedObject
-        Of a true object: the same one as it looks the same, its parts renumbered. Each of them is as true.
-    """
+    """Parts of an object in an image, the root first. Camera frame, metres."""
 
     image: str
     category: str
     rotation: Array
+    """(K, 3, 3) float."""
     center: Array
     size: Array
+    """(K, 3) float. Of the posed boxes."""
     score: float = 1.0
+    """Of a found object."""
     counted: bool = True
+    """Of a true object: whether it is to be found. Who finds another one neither wins nor loses."""
     equals: tuple[PosedObject, ...] = ()
+    """Of a true object: the same one as it looks the same, its parts renumbered. Each of them is as true."""
 
 
 Criterion = Callable[[PosedObject, PosedObject], Right]

@@ -18,32 +18,21 @@ from artsim.observing.sample import Sample
 
 @dataclass(frozen=True)
 class Condition:
-    """A condition.
-
-    Attributes
-    ----------
-    about : str
-        What it is, for people.
-    noise : str
-        Depth sensor.
-    states : str
-    preset : str
-        From where objects are seen.
-    hidden : float
-        Share of the points that are cut away on one side.
-    outlier_share : float
-        Share of the cloud's points that are of a table, a wall or a neighbour.
-    num_points : int
-        Points of a cloud before it is cut.
-    """
+    """A condition."""
 
     about: str
+    """What it is, for people."""
     noise: SensorName = "none"
+    """Depth sensor."""
     states: StateMode = "uniform"
     preset: ViewPreset = "artimage"
+    """From where objects are seen."""
     hidden: float = 0.0
+    """Share of the points that are cut away on one side."""
     outlier_share: float = 0.0
+    """Share of the cloud's points that are of a table, a wall or a neighbour."""
     num_points: int = NUM_POINTS
+    """Points of a cloud before it is cut."""
 
 
 CONDITIONS: dict[str, Condition] = {

@@ -142,28 +142,18 @@ def rest_centers(translation: Array, size: Array, T_camera_part: Array) -> Array
 
 @dataclass(frozen=True)
 class Metric:
-    """How far an estimate is from the truth, for every part.
-
-    Attributes
-    ----------
-    errors : callable
-        Gives (K,) values for an estimate of the K parts of a sample; NaN where the metric does not apply.
-    failed : float or callable
-        Value of every part when there is no estimate; or a callable that gives (K,) of them for a sample.
-    title : str
-        Column of the table; empty: figures go to JSON only.
-    factor : float
-        From the values to the unit of the table.
-    digits : int
-        Decimals in the table.
-    less_is_better : bool
-    """
+    """How far an estimate is from the truth, for every part."""
 
     errors: Callable[[Estimate, Sample], Array]
+    """Gives (K,) values for an estimate of the K parts of a sample; NaN where the metric does not apply."""
     failed: float | Callable[[Sample], Array]
+    """Value of every part when there is no estimate; or a callable that gives (K,) of them for a sample."""
     title: str = ""
+    """Column of the table; empty: figures go to JSON only."""
     factor: float = 1.0
+    """From the values to the unit of the table."""
     digits: int = 2
+    """Decimals in the table."""
     less_is_better: bool = True
 
     def failed_values(self, sample: Sample) -> Array:

@@ -12,20 +12,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Published:
-    """Means of one method, by part; empty where they are not known.
-
-    Attributes
-    ----------
-    rotation, translation, iou : tuple of float
-        Degrees; PartNet units or metres; 0 to 1.
-    seconds : float or None
-        For one cloud, on the machine of the paper.
-    """
+    """Means of one method, by part; empty where they are not known."""
 
     rotation: tuple[float, ...] = ()
     translation: tuple[float, ...] = ()
     iou: tuple[float, ...] = ()
+    """Degrees; PartNet units or metres; 0 to 1."""
     seconds: float | None = None
+    """For one cloud, on the machine of the paper."""
 
 
 TITLES = {

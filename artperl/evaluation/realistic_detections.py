@@ -28,33 +28,22 @@ LEAST_VISIBLE = 0.1
 
 @dataclass(frozen=True)
 class Flaws:
-    """How detections differ from the truth. All are chosen, none is measured on a detector.
-
-    Attributes
-    ----------
-    border : float
-        Standard deviation in pixels by which a mask's border lies too far out or in.
-    cut : float
-        Share of masks that lack a piece, 10 to 30 % on one side.
-    leak : float
-        Share of masks that take in a patch of what is beside them, up to 10 % of their area.
-    missed : float
-        Share of fully visible objects that are not found; up to half as many again of those that are mostly hidden.
-    confused : float
-        Share of objects that get another category.
-    twice : float
-        Share of objects that are found twice.
-    false : float
-        False detections an image, on average.
-    """
+    """How detections differ from the truth. All are chosen, none is measured on a detector."""
 
     border: float = 2.0
+    """Standard deviation in pixels by which a mask's border lies too far out or in."""
     cut: float = 0.1
+    """Share of masks that lack a piece, 10 to 30 % on one side."""
     leak: float = 0.15
+    """Share of masks that take in a patch of what is beside them, up to 10 % of their area."""
     missed: float = 0.04
+    """Share of fully visible objects that are not found; up to half as many again of those that are mostly hidden."""
     confused: float = 0.02
+    """Share of objects that get another category."""
     twice: float = 0.03
+    """Share of objects that are found twice."""
     false: float = 0.3
+    """False detections an image, on average."""
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

@@ -37,43 +37,28 @@ _FAR_OFF = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Scored:
-    """Errors of one estimate against one sample of K parts.
-
-    Attributes
-    ----------
-    category : str
-    errors : dict of (K,) float
-        Values of :data:`artperl.evaluation.metrics.METRICS`, by the same keys.
-    parts_found : float
-        Share of parts with an estimated one of their own near their true pose, or one that looks the same, whatever its
-        number; of as many as there are, or as were estimated if those are more.
-    segmentation : float
-        Share of points with the right part.
-    failed : bool
-    symptoms : Symptoms
-    confidence : float
-    milliseconds : float
-    part_confidence : (E,) float
-        Of the estimated parts.
-    part_right : (E,) bool
-        Whether each estimated part has a true part of its own near it.
-    part_symptoms : PartSymptoms
-    symmetric_errors : dict of (K,) float, or None
-        Errors against the nearest of the truths that look the same; None where the object has no symmetry.
-    """
+    """Errors of one estimate against one sample of K parts."""
 
     category: str
     errors: dict[str, Array]
+    """dict of (K,) float. Values of :data:`artperl.evaluation.metrics.METRICS`, by the same keys."""
     parts_found: float
+    """Share of parts with an estimated one of their own near their true pose, or one that looks the same, whatever its
+    number; of as many as there are, or as were estimated if those are more."""
     segmentation: float
+    """Share of points with the right part."""
     failed: bool
     symptoms: Symptoms
     confidence: float
     milliseconds: float
     part_confidence: Array
+    """(E,) float. Of the estimated parts."""
     part_right: NDArray[np.bool_]
+    """(E,) bool. Whether each estimated part has a true part of its own near it."""
     part_symptoms: PartSymptoms
     symmetric_errors: dict[str, Array] | None = None
+    """dict of (K,) float, or None. Errors against the nearest of the truths that look the same; None where the object
+    has no symmetry."""
 
     @property
     def up_to_symmetry(self) -> Scored:

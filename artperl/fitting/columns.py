@@ -12,14 +12,10 @@ class Columns:
     The first are a turn about the middle of the cloud (3), radians, and a motion (3), metres.
 
     Steps of rigid references end after the states; steps whose axes stay end after the shifts.
-
-    Attributes
-    ----------
-    num_rows : int
-        P.
     """
 
     num_rows: int
+    """P."""
 
     @property
     def state(self) -> slice:

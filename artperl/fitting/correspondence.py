@@ -36,29 +36,19 @@ BACK_FACE = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Target(Batch):
-    """An observed cloud, prepared for matching.
-
-    Attributes
-    ----------
-    observed : Observed
-    share : (B, N) float
-        Weights of the points; they add up to 1.
-    middle : (B, 1, 3) float
-        Mean of the points.
-    unit : (B,) float
-        Diagonal of the object, metres, in which distances are counted.
-    rays : (B, N, 2) float
-        Points on the image plane at depth 1; those without weight are far off.
-    gap : (B,) float
-        Distance on that plane that may lie between a point within the outline and the nearest ray.
-    """
+    """An observed cloud, prepared for matching."""
 
     observed: Observed
     share: Tensor
+    """(B, N) float. Weights of the points; they add up to 1."""
     middle: Tensor
+    """(B, 1, 3) float. Mean of the points."""
     unit: Tensor
+    """(B,) float. Diagonal of the object, metres, in which distances are counted."""
     rays: Tensor
+    """(B, N, 2) float. Points on the image plane at depth 1; those without weight are far off."""
     gap: Tensor
+    """(B,) float. Distance on that plane that may lie between a point within the outline and the nearest ray."""
 
     @staticmethod
     def of(observed: Observed, unit: Tensor) -> Target:

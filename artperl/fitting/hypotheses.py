@@ -39,21 +39,12 @@ _FLIP = torch.diag(torch.tensor([1.0, -1.0, -1.0]))
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """What is known of one cloud.
-
-    Attributes
-    ----------
-    cloud : (1, N, 3) float
-        Camera frame, metres, in random order.
-    clouds : Clouds
-        The same at a common place and size.
-    perceived : Perceived
-    references : References
-    options : EstimatorOptions
-    """
+    """What is known of one cloud."""
 
     cloud: Tensor
+    """(1, N, 3) float. Camera frame, metres, in random order."""
     clouds: Clouds
+    """The same at a common place and size."""
     perceived: Perceived
     references: References
     options: EstimatorOptions
@@ -79,21 +70,14 @@ class Context:
 
 @dataclass(frozen=True, eq=False)
 class Hypotheses:
-    """H references, each in a state.
-
-    Attributes
-    ----------
-    shapes : Shapes
-        H rows.
-    theta : Theta
-        H rows.
-    row : list of int, length H
-        Of the base.
-    """
+    """H references, each in a state."""
 
     shapes: Shapes
+    """H rows."""
     theta: Theta
+    """H rows."""
     row: list[int]
+    """Of the base."""
 
     @staticmethod
     def join(several: Sequence[Hypotheses]) -> Hypotheses:
@@ -106,33 +90,22 @@ class Hypotheses:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """The best fit to one cloud: records of one row.
-
-    Attributes
-    ----------
-    shapes : Shapes
-    observed : Observed
-        The cloud, labelled by perception and by how near the fitted parts are.
-    start, theta : Theta
-        The hypothesis, and where it ends.
-    row : int
-        Of the base.
-    residual : float
-        Root of the mean robust squared distance from the reference, in diagonals, weighed by part.
-    disagreement : float
-        Median distance between where perception and the fit place the points in the rest frame, over the diagonal.
-    outside : bool
-        Whether the object would be seen from elsewhere than the camera is known to be.
-    """
+    """The best fit to one cloud: records of one row."""
 
     shapes: Shapes
     observed: Observed
+    """The cloud, labelled by perception and by how near the fitted parts are."""
     start: Theta
     theta: Theta
+    """The hypothesis, and where it ends."""
     row: int
+    """Of the base."""
     residual: float
+    """Root of the mean robust squared distance from the reference, in diagonals, weighed by part."""
     disagreement: float
+    """Median distance between where perception and the fit place the points in the rest frame, over the diagonal."""
     outside: bool
+    """Whether the object would be seen from elsewhere than the camera is known to be."""
 
     def to(self, device: torch.device | str) -> Fit:
         """The fit on another device."""

@@ -24,19 +24,13 @@ _ROUND = 25
 
 @dataclass(frozen=True, eq=False)
 class KeypointFit(Batch):
-    """Pose, states and shape of B objects.
-
-    Attributes
-    ----------
-    trees : Trees
-        Joints as the prior tells them, at diagonal 1.
-    theta : Theta
-    beta : (B, 10) float
-    """
+    """Pose, states and shape of B objects."""
 
     trees: Trees
+    """Joints as the prior tells them, at diagonal 1."""
     theta: Theta
     beta: Tensor
+    """(B, 10) float."""
 
     def posed(self) -> Posed:
         """Where the parts are; box centres are the origin of the rest frame."""

@@ -23,24 +23,16 @@ from artperl.fitting.shape_prior import ShapePrior
 
 @dataclass(frozen=True, eq=False)
 class Refined(Batch):
-    """Outcome of a refinement of B objects.
-
-    Attributes
-    ----------
-    theta : Theta
-    axis : (B, P, 3) float
-        The reference's axes as they lean now: those of ``shapes.trees`` unless they were free to.
-    energy, start_energy : (B,) float
-        Of the result and of the start; the first is never larger.
-    iterations : (B,) int64
-        That changed something.
-    """
+    """Outcome of a refinement of B objects."""
 
     theta: Theta
     axis: Tensor
+    """(B, P, 3) float. The reference's axes as they lean now: those of ``shapes.trees`` unless they were free to."""
     energy: Tensor
     start_energy: Tensor
+    """(B,) float. Of the result and of the start; the first is never larger."""
     iterations: Tensor
+    """(B,) int64. That changed something."""
 
 
 def refine(

@@ -19,18 +19,13 @@ _AXIS_FLOOR = 0.02
 
 @dataclass(frozen=True, eq=False)
 class ShapePrior(Batch):
-    """What deviations p of B references cost: ``p . precision p``, in squared diagonals.
-
-    Attributes
-    ----------
-    active : (B, D) bool
-        Parameters that move at all, in the order of :class:`Columns`. D ends after the shifts where no axis leans.
-    precision : (B, D, D) float
-        Pose and states cost nothing.
-    """
+    """What deviations p of B references cost: ``p . precision p``, in squared diagonals."""
 
     active: Tensor
+    """(B, D) bool. Parameters that move at all, in the order of :class:`Columns`. D ends after the shifts where no axis
+    leans."""
     precision: Tensor
+    """(B, D, D) float. Pose and states cost nothing."""
 
     @staticmethod
     def of(shapes: Shapes, unit: Tensor, options: RefineOptions, axis_prior: AxisPrior | None) -> ShapePrior:

@@ -17,18 +17,14 @@ _SCORED = 128
 
 @dataclass(frozen=True, eq=False)
 class Similarity:
-    """``target = scale * rotation @ source + translation``, of any leading dimensions.
-
-    Attributes
-    ----------
-    scale : (...) float
-    rotation : (..., 3, 3) float
-    translation : (..., 3) float
-    """
+    """``target = scale * rotation @ source + translation``, of any leading dimensions."""
 
     scale: Array
+    """(...) float."""
     rotation: Array
+    """(..., 3, 3) float."""
     translation: Array
+    """(..., 3) float."""
 
     def __call__(self, points: Array) -> Array:
         """(..., N, 3) where points (..., N, 3) go."""

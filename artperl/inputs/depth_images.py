@@ -35,22 +35,15 @@ _EXR = """python -c "import imageio.v3 as i, numpy as n; n.save('depth.npy', i.i
 
 @dataclass(frozen=True)
 class DepthImage:
-    """Depth as it stands in a file.
-
-    Attributes
-    ----------
-    values : (H, W)
-        In the file's unit; 0 or not finite where nothing was measured.
-    whole : bool
-        Whether they are whole numbers, which count millimetres by custom.
-    notes, warnings : tuple of str
-        What was assumed or left out, and what looks wrong.
-    """
+    """Depth as it stands in a file."""
 
     values: NDArray[Any]
+    """(H, W). In the file's unit; 0 or not finite where nothing was measured."""
     whole: bool
+    """Whether they are whole numbers, which count millimetres by custom."""
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    """What was assumed or left out, and what looks wrong."""
 
 
 def read_depth(path: Path) -> DepthImage:

@@ -25,29 +25,19 @@ _NAMED = 8
 
 @dataclass(frozen=True, eq=False)
 class Detection:
-    """An object that a detector has found in an image.
-
-    Attributes
-    ----------
-    image : int or str
-        Identity of the image, as the file has it.
-    category : str
-    score : float
-        0 to 1.
-    segmentation : object
-        As the file has it; None where it has a box only.
-    box : 4 float
-        Left, top, width, height, pixels.
-    size : (int, int)
-        Width and height of the image.
-    """
+    """An object that a detector has found in an image."""
 
     image: int | str
+    """Identity of the image, as the file has it."""
     category: str
     score: float
+    """0 to 1."""
     segmentation: Any
+    """As the file has it; None where it has a box only."""
     box: tuple[float, float, float, float]
+    """Left, top, width, height, pixels."""
     size: tuple[int, int]
+    """(int, int). Width and height of the image."""
 
     @property
     def mask(self) -> NDArray[np.bool_]:
@@ -63,20 +53,13 @@ class Detection:
 
 @dataclass(frozen=True)
 class Detections:
-    """Detections of a file.
-
-    Attributes
-    ----------
-    all : tuple of Detection
-    skipped : tuple of str
-        What is wrong with each that was left out, where that was asked for.
-    notes : tuple of str
-        What was assumed.
-    """
+    """Detections of a file."""
 
     all: tuple[Detection, ...]
     skipped: tuple[str, ...] = ()
+    """What is wrong with each that was left out, where that was asked for."""
     notes: tuple[str, ...] = ()
+    """What was assumed."""
 
     def of(self, image: int | str) -> tuple[Detection, ...]:
         """Those of one image."""

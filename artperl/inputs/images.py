@@ -25,27 +25,18 @@ IN_COLOUR = ("RGB", "RGBA", "P", "PA")
 
 @dataclass(frozen=True)
 class Picture:
-    """A decoded picture.
-
-    Attributes
-    ----------
-    values : (H, W) or (H, W, C)
-        Of a picture with a palette: the indices.
-    mode : str
-        As Pillow names it: "L", "I;16", "RGBA", "P" and so on.
-    format : str
-        One of :data:`FORMATS`.
-    palette : (256, 3) uint8 or None
-        Colours of the indices.
-    transparent : frozenset of int
-        Indices that are transparent.
-    """
+    """A decoded picture."""
 
     values: NDArray[Any]
+    """(H, W) or (H, W, C). Of a picture with a palette: the indices."""
     mode: str
+    """As Pillow names it: "L", "I;16", "RGBA", "P" and so on."""
     format: str
+    """One of :data:`FORMATS`."""
     palette: NDArray[np.uint8] | None = None
+    """(256, 3) uint8 or None. Colours of the indices."""
     transparent: frozenset[int] = field(default_factory=frozenset)
+    """Indices that are transparent."""
 
 
 def read_picture(path: Path, what: str) -> Picture:

@@ -46,25 +46,17 @@ _OFF = 0.25
 
 @dataclass(frozen=True, eq=False)
 class Intrinsics:
-    """The camera of a depth image.
-
-    Attributes
-    ----------
-    K : (3, 3) float
-        Pixels; the centre of the first pixel is at (0.5, 0.5).
-    size : (int, int) or None
-        Width and height of the image that it is for, where the file says so.
-    depth_scale : float or None
-        Metres of one unit of a depth image of whole numbers, where the file says so.
-    notes, warnings : tuple of str
-        What was assumed, and what is not undone.
-    """
+    """The camera of a depth image."""
 
     K: Array
+    """(3, 3) float. Pixels; the centre of the first pixel is at (0.5, 0.5)."""
     size: tuple[int, int] | None = None
+    """(int, int) or None. Width and height of the image that it is for, where the file says so."""
     depth_scale: float | None = None
+    """Metres of one unit of a depth image of whole numbers, where the file says so."""
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    """What was assumed, and what is not undone."""
 
 
 def read_camera(path: Path, hints: Hints | None = None, pixel_center: PixelCenter | None = None) -> Intrinsics:

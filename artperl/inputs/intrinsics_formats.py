@@ -36,46 +36,30 @@ _BARE = "a bare matrix, as OpenCV has it"
 
 @dataclass(frozen=True)
 class Hints:
-    """What is known of the image whose camera is looked for.
-
-    Attributes
-    ----------
-    image_id : str or None
-        Which image of a file with many.
-    name : str
-        Of the depth image's file, without its ending.
-    size : (int, int) or None
-        Its width and height.
-    """
+    """What is known of the image whose camera is looked for."""
 
     image_id: str | None = None
+    """Which image of a file with many."""
     name: str = ""
+    """Of the depth image's file, without its ending."""
     size: tuple[int, int] | None = None
+    """(int, int) or None. Its width and height."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stated:
-    """A camera as a file states it.
-
-    Attributes
-    ----------
-    K : (3, 3) float
-    format : str
-        What the format is called.
-    center : float
-        Both coordinates of the centre of the first pixel.
-    size : (int, int) or None
-    depth_scale : float or None
-        Metres.
-    distortion : tuple of float
-    notes, warnings : tuple of str
-    """
+    """A camera as a file states it."""
 
     K: Array
+    """(3, 3) float."""
     format: str
+    """What the format is called."""
     center: float
+    """Both coordinates of the centre of the first pixel."""
     size: tuple[int, int] | None = None
+    """(int, int) or None."""
     depth_scale: float | None = None
+    """Metres."""
     distortion: tuple[float, ...] = ()
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()

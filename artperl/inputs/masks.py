@@ -40,15 +40,10 @@ _NEARLY_GREY = 24
 
 @dataclass(frozen=True)
 class Mask:
-    """Where an object is, and what was assumed to tell.
-
-    Attributes
-    ----------
-    shown : (H, W) bool
-    notes, warnings : tuple of str
-    """
+    """Where an object is, and what was assumed to tell."""
 
     shown: NDArray[np.bool_]
+    """(H, W) bool."""
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 

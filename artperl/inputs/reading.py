@@ -129,22 +129,15 @@ def _of_points(path: Path, options: InputOptions) -> Cloud:
 
 @dataclass(frozen=True, eq=False)
 class MetricDepth:
-    """A depth image in metres, and its camera.
-
-    Attributes
-    ----------
-    values : (H, W) float
-        0, or not finite, where nothing was measured.
-    K : (3, 3) float
-        Pixels; the centre of the first pixel is at (0.5, 0.5).
-    notes, warnings : tuple of str
-        As of :class:`Cloud`.
-    """
+    """A depth image in metres, and its camera."""
 
     values: Array
+    """(H, W) float. 0, or not finite, where nothing was measured."""
     K: Array
+    """(3, 3) float. Pixels; the centre of the first pixel is at (0.5, 0.5)."""
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    """As of :class:`Cloud`."""
 
 
 def read_depth_image(path: Path, options: InputOptions) -> MetricDepth:

@@ -48,29 +48,20 @@ _WORSE, _SLACK = 1.8, 0.003
 
 @dataclass(frozen=True, eq=False)
 class _Anchor:
-    """What an estimate of one frame says of all that follow it.
-
-    Attributes
-    ----------
-    estimate : Estimate
-    shapes : Shapes
-        The fitted reference, whose shape stays.
-    T_fit_estimate : (K, 4, 4) float
-        From the estimate's rest frame, as carried by each part, to the fit's: boxes may have moved slides.
-    state : (K,) float
-        What the estimate's states have over those of the fit.
-    rest : (K, 3) float
-        Box centres in the estimate's rest frame.
-    residual : float
-        Of the fit, by what is refined here.
-    """
+    """What an estimate of one frame says of all that follow it."""
 
     estimate: Estimate
     shapes: Shapes
+    """The fitted reference, whose shape stays."""
     T_fit_estimate: Array
+    """(K, 4, 4) float. From the estimate's rest frame, as carried by each part, to the fit's: boxes may have moved
+    slides."""
     state: Array
+    """(K,) float. What the estimate's states have over those of the fit."""
     rest: Array
+    """(K, 3) float. Box centres in the estimate's rest frame."""
     residual: float
+    """Of the fit, by what is refined here."""
 
 
 def track(with_fit: Callable[[ArrayLike], tuple[Estimate, Fit]], clouds: Iterable[ArrayLike]) -> Iterator[Estimate]:

@@ -15,43 +15,31 @@ _HIDDEN = 128
 
 @dataclass(frozen=True, eq=False)
 class Coordinates(Batch):
-    """What is said of B clouds of N points, K parts.
-
-    Attributes
-    ----------
-    part_logits : (B, N, K) float
-    npcs : (B, N, K, 3) float
-        Place of each point in each part's box: 0.5 at its centre, lengths in diagonals of the box.
-    scale : (B, N, 1) float
-    shift : (B, N, 3) float
-        ``naocs = scale * npcs + shift`` of the point's own part: the place in the object's rest frame, 0.5 at its
-        centre, lengths in the object's diagonals.
-    """
+    """What is said of B clouds of N points, K parts."""
 
     part_logits: Tensor
+    """(B, N, K) float."""
     npcs: Tensor
+    """(B, N, K, 3) float. Place of each point in each part's box: 0.5 at its centre, lengths in diagonals of the
+    box."""
     scale: Tensor
+    """(B, N, 1) float."""
     shift: Tensor
+    """(B, N, 3) float. ``naocs = scale * npcs + shift`` of the point's own part: the place in the object's rest frame,
+    0.5 at its centre, lengths in the object's diagonals."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointPoints(Batch):
-    """What each point of B clouds of N says of the joint near it.
-
-    Attributes
-    ----------
-    joint_logits : (B, N, K) float
-        Which joint: k is that of part k, 0 none.
-    axis, offset : (B, N, 3) float
-        Direction of the joint, and from the point to the nearest place of the joint.
-    heat : (B, N) float
-        Logit of 1 less the distance from the joint over :data:`artperl.fitting.joint_votes.REACH`.
-    """
+    """What each point of B clouds of N says of the joint near it."""
 
     joint_logits: Tensor
+    """(B, N, K) float. Which joint: k is that of part k, 0 none."""
     axis: Tensor
     offset: Tensor
+    """(B, N, 3) float. Direction of the joint, and from the point to the nearest place of the joint."""
     heat: Tensor
+    """(B, N) float. Logit of 1 less the distance from the joint over :data:`artperl.fitting.joint_votes.REACH`."""
 
 
 class _PointNetwork(nn.Module):

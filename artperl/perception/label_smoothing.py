@@ -42,18 +42,12 @@ takes the place of x, so that 40 products do for 100."""
 
 @dataclass(frozen=True, eq=False)
 class Walks:
-    """Walks among the N points of a cloud. What is said of the points is smoothed by :meth:`mean_of_ends`.
-
-    Attributes
-    ----------
-    step : (N, N) sparse float
-        Share of the walks at each point that go on to another one.
-    stay : (N, 1) float
-        Share of the walks that end at each point.
-    """
+    """Walks among the N points of a cloud. What is said of the points is smoothed by :meth:`mean_of_ends`."""
 
     step: csr_matrix
+    """(N, N) sparse float. Share of the walks at each point that go on to another one."""
     stay: Array
+    """(N, 1) float. Share of the walks that end at each point."""
 
     @staticmethod
     def of(points: Array, diagonal: float) -> Walks:

@@ -20,32 +20,23 @@ from artperl.core.pointnet2 import PointNet2, exact
 
 @dataclass(frozen=True, eq=False)
 class Perceived(Batch):
-    """What the network says of B clouds of N points, P rows for parts. Rest-frame lengths are in diagonals.
-
-    Attributes
-    ----------
-    part_logits : (B, N, P) float
-    canonical : (B, N, 3) float
-        Where each point lies in the rest frame, at rest.
-    spread : (B, N) float
-        Logarithm of the expected error of ``canonical``.
-    own_logits : (B, N) float
-        Whether each point is of the object, rather than of the table or a neighbour.
-    valid_logits : (B, P) float
-        Whether the object has each part.
-    box_center, box_size : (B, P, 3) float
-    log_diagonal : (B,) float
-        Logarithm of the object's diagonal over the cloud's scale.
-    """
+    """What the network says of B clouds of N points, P rows for parts. Rest-frame lengths are in diagonals."""
 
     part_logits: Tensor
+    """(B, N, P) float."""
     canonical: Tensor
+    """(B, N, 3) float. Where each point lies in the rest frame, at rest."""
     spread: Tensor
+    """(B, N) float. Logarithm of the expected error of ``canonical``."""
     own_logits: Tensor
+    """(B, N) float. Whether each point is of the object, rather than of the table or a neighbour."""
     valid_logits: Tensor
+    """(B, P) float. Whether the object has each part."""
     box_center: Tensor
     box_size: Tensor
+    """(B, P, 3) float."""
     log_diagonal: Tensor
+    """(B,) float. Logarithm of the object's diagonal over the cloud's scale."""
 
     @property
     def valid(self) -> Tensor:
@@ -75,27 +66,19 @@ class Perceived(Batch):
 
 @dataclass(frozen=True, eq=False)
 class Votes(Batch):
-    """What each point of B clouds of N says of its own part. Rest-frame lengths are in diagonals.
-
-    Attributes
-    ----------
-    canonical, spread, own_logits, log_diagonal
-        As in :class:`Perceived`.
-    box : (B, N, 6) float
-        Centre and size of the part's box.
-    joint : (B, N, 9) float
-        The part's joint as :attr:`artperl.data.truth.Truth.joint` has it.
-    level_logits : (B, N, P) float
-        How many joints are between the root and the part.
-    """
+    """What each point of B clouds of N says of its own part. Rest-frame lengths are in diagonals."""
 
     canonical: Tensor
     spread: Tensor
     own_logits: Tensor
     log_diagonal: Tensor
+    """As in :class:`Perceived`."""
     box: Tensor
+    """(B, N, 6) float. Centre and size of the part's box."""
     joint: Tensor
+    """(B, N, 9) float. The part's joint as :attr:`artperl.data.truth.Truth.joint` has it."""
     level_logits: Tensor
+    """(B, N, P) float. How many joints are between the root and the part."""
 
     def of_points(self, chosen: Tensor) -> Votes:
         """Of those points alone that are chosen (N,) bool."""

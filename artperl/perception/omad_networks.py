@@ -67,30 +67,22 @@ class KeypointPrior(nn.Module):
 
 @dataclass(frozen=True, eq=False)
 class Cues(Batch):
-    """What is said of B clouds of N points, K parts. Lengths as in :class:`artperl.core.clouds.Clouds`.
-
-    Attributes
-    ----------
-    part_logits : (B, N, K) float
-    keypoints : (B, K, 24, 3) float
-        As posed.
-    quaternion : (B, 4) float
-        Of the root, w first, of length 1.
-    translation : (B, 3) float
-        Of the root's rest frame.
-    log_diagonal : (B,) float
-    state : (B, K) float
-        Each joint's place between its limits, 0 to 1.
-    beta : (B, 10) float
-    """
+    """What is said of B clouds of N points, K parts. Lengths as in :class:`artperl.core.clouds.Clouds`."""
 
     part_logits: Tensor
+    """(B, N, K) float."""
     keypoints: Tensor
+    """(B, K, 24, 3) float. As posed."""
     quaternion: Tensor
+    """(B, 4) float. Of the root, w first, of length 1."""
     translation: Tensor
+    """(B, 3) float. Of the root's rest frame."""
     log_diagonal: Tensor
+    """(B,) float."""
     state: Tensor
+    """(B, K) float. Each joint's place between its limits, 0 to 1."""
     beta: Tensor
+    """(B, 10) float."""
 
 
 class CueNetwork(nn.Module):

@@ -46,17 +46,12 @@ _DOUBT = 0.02
 
 @dataclass(frozen=True, eq=False)
 class PerceivedTree(Perceived):
-    """What is perceived of B clouds whose parts were found by :func:`group_votes`.
-
-    Attributes
-    ----------
-    joint : (B, P, 9) float
-        As :func:`artperl.core.clouds.joint_rows` has it.
-    parent : (B, P) int64
-    """
+    """What is perceived of B clouds whose parts were found by :func:`group_votes`."""
 
     joint: Tensor
+    """(B, P, 9) float. As :func:`artperl.core.clouds.joint_rows` has it."""
     parent: Tensor
+    """(B, P) int64."""
 
 
 def group_votes(votes: Votes) -> PerceivedTree:

@@ -26,23 +26,15 @@ _OTHER_SORT = 0.35
 
 @dataclass(frozen=True, eq=False)
 class ShapeBase:
-    """Reference objects at diagonal 1 in their rest frames, with what is needed to find and to fit them.
-
-    Attributes
-    ----------
-    object_ids, categories : tuple of str, length B
-    trees : tuple of KinematicTree, length B
-    shapes : Shapes
-        B rows, padded to the most parts of any object.
-    embeddings : (B, E) float or None
-        One for each object, of whatever network searches the base.
-    """
+    """Reference objects at diagonal 1 in their rest frames, with what is needed to find and to fit them."""
 
     object_ids: tuple[str, ...]
     categories: tuple[str, ...]
     trees: tuple[KinematicTree, ...]
     shapes: Shapes
+    """B rows, padded to the most parts of any object."""
     embeddings: Tensor | None = None
+    """(B, E) float or None. One for each object, of whatever network searches the base."""
 
     def __len__(self) -> int:
         return len(self.object_ids)

@@ -31,20 +31,12 @@ _FAR, _NEAR = 30.0, 0.05
 
 @dataclass(frozen=True, eq=False)
 class SceneObject:
-    """An object of an image.
-
-    Attributes
-    ----------
-    detection : Detection
-    estimate : Estimate or None
-    problem : str
-        Why there is no estimate.
-    milliseconds : float
-    """
+    """An object of an image."""
 
     detection: Detection
     estimate: Estimate | None
     problem: str = ""
+    """Why there is no estimate."""
     milliseconds: float = 0.0
 
     @property
@@ -55,17 +47,11 @@ class SceneObject:
 
 @dataclass(frozen=True, eq=False)
 class SceneEstimate:
-    """All objects of an image, in the order of their detections. Camera frame, metres, radians.
-
-    Attributes
-    ----------
-    objects : tuple of SceneObject
-    milliseconds : dict
-        By stage.
-    """
+    """All objects of an image, in the order of their detections. Camera frame, metres, radians."""
 
     objects: tuple[SceneObject, ...]
     milliseconds: dict[str, float] = field(default_factory=dict)
+    """By stage."""
 
     def __str__(self) -> str:
         lines = []

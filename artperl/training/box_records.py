@@ -38,21 +38,14 @@ _RATE, _DECAY = 2e-3, 0.1
 
 @dataclass(frozen=True, eq=False)
 class Records(Batch):
-    """B estimates: what was seen, and the true boxes, in the estimated rest frame, in diagonals.
-
-    Attributes
-    ----------
-    evidence : Evidence
-    center, size : (B, P, 3) float
-        Where the boxes are seen, brought to rest by the estimated poses.
-    rest : (B, P, 3) float
-        Their centres at rest.
-    """
+    """B estimates: what was seen, and the true boxes, in the estimated rest frame, in diagonals."""
 
     evidence: Evidence
     center: Tensor
     size: Tensor
+    """(B, P, 3) float. Where the boxes are seen, brought to rest by the estimated poses."""
     rest: Tensor
+    """(B, P, 3) float. Their centres at rest."""
 
 
 class _Examined(Dataset[list[Records]]):

@@ -32,47 +32,30 @@ class Report(Protocol):
 
 @dataclass
 class Context:
-    """What every stage of a run works with.
-
-    Attributes
-    ----------
-    options : TrainOptions
-    folder : RunFolder
-    objects : TrainingObjects
-    state : RunState
-        The stages change it in place.
-    parent : Estimator or Stored or None
-        The estimator that the run started from.
-    assemble : callable
-        Makes an estimator of the networks as they stand.
-    device : torch.device
-    workers : int
-        Processes that make training clouds and estimates; the result does not depend on it.
-    progress : bool
-        Show bars.
-    provenance : dict
-        See :func:`artperl.training.recipes.provenance`.
-    report : Report
-        Hears the figures of every step.
-    ranks : Ranks
-        The processes that learn this run together.
-    stop : Stop
-        Whether the run is to stop after the present step.
-    """
+    """What every stage of a run works with."""
 
     options: TrainOptions
     folder: RunFolder
     objects: TrainingObjects
     state: RunState
+    """The stages change it in place."""
     parent: Estimator | Stored | None
+    """The estimator that the run started from."""
     assemble: Callable[[Context], Estimator | Stored]
+    """Makes an estimator of the networks as they stand."""
     device: torch.device
     workers: int
+    """Processes that make training clouds and estimates; the result does not depend on it."""
     progress: bool
+    """Show bars."""
     provenance: dict[str, Any]
+    """See :func:`artperl.training.recipes.provenance`."""
     report: Report
+    """Hears the figures of every step."""
     ranks: Ranks = field(default_factory=Ranks)
+    """The processes that learn this run together."""
     stop: Stop = field(default_factory=Stop)
+    """Whether the run is to stop after the present step."""
     _counting: str | None = None
     _since: float = 0.0
 

@@ -29,17 +29,10 @@ _TURN, _MOVE, _SCALE = 1.0, 0.3, 0.15
 
 @dataclass(frozen=True, eq=False)
 class Problem(Batch):
-    """B fitting problems.
-
-    Attributes
-    ----------
-    shapes : Shapes
-        The references.
-    observed : Observed
-    start, goal : Theta
-    """
+    """B fitting problems."""
 
     shapes: Shapes
+    """The references."""
     observed: Observed
     start: Theta
     goal: Theta

@@ -21,24 +21,16 @@ BASE_SEEDS = 2_000_000
 
 @dataclass(frozen=True, eq=False)
 class TrainingObjects:
-    """Objects of a run.
-
-    Attributes
-    ----------
-    procedural : list of ArticulatedObject
-        References of procedural families; training clouds show others.
-    given : list of ArticulatedObject
-        Objects of files, or real ones; training clouds show the same.
-    base : ShapeBase
-        Of all of them.
-    data : DataOptions
-        What training clouds show.
-    """
+    """Objects of a run."""
 
     procedural: list[ArticulatedObject]
+    """References of procedural families; training clouds show others."""
     given: list[ArticulatedObject]
+    """Objects of files, or real ones; training clouds show the same."""
     base: ShapeBase
+    """Of all of them."""
     data: DataOptions
+    """What training clouds show."""
 
     @classmethod
     def of(cls, options: TrainOptions) -> TrainingObjects:

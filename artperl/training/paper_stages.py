@@ -119,18 +119,12 @@ class RetrievalStage:
 
 @dataclass(frozen=True)
 class AgentStage:
-    """Algorithm 1 on retrieved references and predicted labels: first cloning alone, then cloning and PPO.
-
-    Attributes
-    ----------
-    estimator : callable
-        The method of a context.
-    episodes : callable
-        Episodes and goals of a rollout, by the method, views, their number, the rows of this process, and chance.
-    """
+    """Algorithm 1 on retrieved references and predicted labels: first cloning alone, then cloning and PPO."""
 
     estimator: Callable[[Context], Any]
+    """The method of a context."""
     episodes: Callable[[Any, Rows, int, slice, torch.Generator], tuple[Any, Theta]]
+    """Episodes and goals of a rollout, by the method, views, their number, the rows of this process, and chance."""
     name: str = "agent"
     lengths: ClassVar[dict[str, str]] = {"agent": "agent_rollouts"}
 

@@ -22,26 +22,17 @@ _MAX_BYTES = 100_000
 
 @dataclass(frozen=True)
 class Recipe:
-    """How an estimator is made.
-
-    Attributes
-    ----------
-    name : str
-    preset : str
-        Of :data:`artperl.training.options.PRESETS`.
-    options : dict
-        What it learns from, as :func:`artperl.training.options.changed` takes it.
-    lengths : dict
-        How long it learns; another preset than the recipe's has its own.
-    sha256 : str
-        Digest of its file.
-    """
+    """How an estimator is made."""
 
     name: str
     preset: str
+    """Of :data:`artperl.training.options.PRESETS`."""
     options: dict[str, Any]
+    """What it learns from, as :func:`artperl.training.options.changed` takes it."""
     lengths: dict[str, Any]
+    """How long it learns; another preset than the recipe's has its own."""
     sha256: str
+    """Digest of its file."""
 
     @classmethod
     def read(cls, name: str) -> Recipe:

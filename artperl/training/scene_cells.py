@@ -35,26 +35,18 @@ many, counts 1; and the bounds of what a cell of a larger or smaller object coun
 
 @dataclass(frozen=True)
 class Cells:
-    """Images, and what is true of their cells.
-
-    Attributes
-    ----------
-    channels : (B, 8, H, W) float32
-    category : (B, h, w) int64
-        Number of the category, from 1; 0 for none.
-    offset : (B, 3, h, w) float32
-        To the middle of the object, as the network tells it.
-    size : (B, h, w) float32
-        Logarithm of the object's diagonal over the unit.
-    weight : (B, h, w) float32
-        Of the cell: small objects count as much as large ones.
-    """
+    """Images, and what is true of their cells."""
 
     channels: Tensor
+    """(B, 8, H, W) float32."""
     category: Tensor
+    """(B, h, w) int64. Number of the category, from 1; 0 for none."""
     offset: Tensor
+    """(B, 3, h, w) float32. To the middle of the object, as the network tells it."""
     size: Tensor
+    """(B, h, w) float32. Logarithm of the object's diagonal over the unit."""
     weight: Tensor
+    """(B, h, w) float32. Of the cell: small objects count as much as large ones."""
 
 
 class SceneCells(Dataset[Cells]):

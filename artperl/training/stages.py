@@ -52,24 +52,16 @@ def _one_tree(objects: TrainingObjects) -> CategoryPrior:
 
 @dataclass(frozen=True)
 class Programme:
-    """What a run of a method learns.
-
-    Attributes
-    ----------
-    networks : callable
-        New networks by name, from the options and the number of rows for parts. Each gets an optimiser.
-    stages : callable
-        The stages, in their order.
-    estimator : callable
-        The estimator that the networks of a context make as they stand.
-    check : callable
-        Raises ConfigError when the method cannot learn from these objects.
-    """
+    """What a run of a method learns."""
 
     networks: Callable[[TrainOptions, int], dict[str, nn.Module]]
+    """New networks by name, from the options and the number of rows for parts. Each gets an optimiser."""
     stages: Callable[[TrainOptions], list[Stage]]
+    """The stages, in their order."""
     estimator: Callable[[Context], Estimator | Stored]
+    """The estimator that the networks of a context make as they stand."""
     check: Callable[[TrainingObjects], object] = _anything
+    """Raises ConfigError when the method cannot learn from these objects."""
 
 
 def stages_of(options: TrainOptions) -> list[Stage]:

@@ -20,29 +20,19 @@ if TYPE_CHECKING:
 
 @dataclass
 class RunState:
-    """All that changes while a run learns, and all that it needs to go on.
-
-    Attributes
-    ----------
-    networks : dict of str to nn.Module
-    optimizers : dict of str to torch.optim.Optimizer
-        One for each of the networks, by the same name.
-    done : Counter of str
-        Steps that each stage has taken, by the stage's name.
-    best : float
-        Lowest validation score so far.
-    history : list of dict
-        Every validation: its ``stage``, ``step``, ``score`` and ``done``.
-    seconds : dict of str to float
-        Processor time of this process that each stage and the validation have taken, by name. Nothing depends on it.
-    """
+    """All that changes while a run learns, and all that it needs to go on."""
 
     networks: dict[str, nn.Module]
     optimizers: dict[str, torch.optim.Optimizer]
+    """One for each of the networks, by the same name."""
     done: Counter[str] = field(default_factory=Counter)
+    """Steps that each stage has taken, by the stage's name."""
     best: float = float("inf")
+    """Lowest validation score so far."""
     history: list[dict[str, Any]] = field(default_factory=list)
+    """Every validation: its ``stage``, ``step``, ``score`` and ``done``."""
     seconds: dict[str, float] = field(default_factory=dict)
+    """Processor time of this process that each stage and the validation have taken, by name. Nothing depends on it."""
     _digest: str = ""
 
     @property

@@ -32,28 +32,18 @@ SAVE_STEPS = 100
 
 @dataclass(frozen=True)
 class SupervisedStage:
-    """A stage of batches of fresh clouds.
-
-    Attributes
-    ----------
-    name : str
-        Of the stage.
-    network : str
-    loss : Loss
-    validated : bool
-        Whether the estimator is validated at intervals: where no later stage learns.
-    steps : str
-        Option that says how many batches.
-    dense : bool
-        Whether clouds are fewer and denser: of as many points as the estimator looks at.
-    """
+    """A stage of batches of fresh clouds."""
 
     name: str
+    """Of the stage."""
     network: str
     loss: Loss
     validated: bool = False
+    """Whether the estimator is validated at intervals: where no later stage learns."""
     steps: str = "perception_steps"
+    """Option that says how many batches."""
     dense: bool = False
+    """Whether clouds are fewer and denser: of as many points as the estimator looks at."""
 
     @property
     def lengths(self) -> dict[str, str]:

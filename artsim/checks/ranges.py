@@ -31,22 +31,15 @@ Values = dict[str, list[float]]
 
 @dataclass(frozen=True)
 class Quantity:
-    """How a kind of ratio is widened.
-
-    Attributes
-    ----------
-    least : float
-        Smallest margin when one object is known, less the more are: a share of the value if ``relative``.
-    relative : bool
-        Whether ``least`` is a share of the value.
-    low, high : float
-        Values beyond which nothing can lie.
-    """
+    """How a kind of ratio is widened."""
 
     least: float
+    """Smallest margin when one object is known, less the more are: a share of the value if ``relative``."""
     relative: bool
+    """Whether ``least`` is a share of the value."""
     low: float
     high: float
+    """Values beyond which nothing can lie."""
 
 
 QUANTITIES = {
@@ -116,18 +109,13 @@ def required_range(name: str, values: Sequence[float], objects: int) -> tuple[fl
 
 @dataclass(frozen=True)
 class Reach:
-    """One ratio of a category.
-
-    Attributes
-    ----------
-    real, required, family : (float, float)
-        Lowest and highest value; ``family`` is NaN where no procedural object has this ratio.
-    """
+    """One ratio of a category."""
 
     name: str
     real: tuple[float, float]
     required: tuple[float, float]
     family: tuple[float, float]
+    """(float, float). Lowest and highest value; ``family`` is NaN where no procedural object has this ratio."""
 
     @property
     def holds_real(self) -> bool:

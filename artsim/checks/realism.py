@@ -56,18 +56,12 @@ _ODD_JOINT = 1.0  # placement and range of joints that move differently, or of o
 
 @dataclass(frozen=True)
 class RealSource:
-    """Where the real objects of a category are.
-
-    Attributes
-    ----------
-    folders : tuple of str
-        PartNet-Mobility categories.
-    moves : tuple of str
-        Joint types that all moving parts must have; any, when empty.
-    """
+    """Where the real objects of a category are."""
 
     folders: tuple[str, ...]
+    """PartNet-Mobility categories."""
     moves: tuple[str, ...] = ()
+    """Joint types that all moving parts must have; any, when empty."""
 
 
 _NAMED_ALIKE = (
@@ -138,31 +132,22 @@ def real_objects(category: str, folder: Path, split: Split, half: Half) -> Itera
 
 @dataclass(frozen=True, eq=False)
 class Likeness:
-    """What two objects are compared by, in the rest frame at a diagonal of 1; K parts, the root first.
-
-    Attributes
-    ----------
-    cloud : (N, 3) float
-        Dense points of the whole surface, at rest.
-    part_clouds : tuple of (N, 3) float
-        Dense points of each part's surface, at rest.
-    box_center, box_size : (K, 3) float
-    turns : (K,) bool
-        Whether the part's joint turns (revolute, continuous, screw).
-    axis, origin : (K, 3) float
-        Of the joints, at rest.
-    limits : (K, 2) float
-        From the rest state on, in radians or diagonals; a full turn either way where there are none.
-    """
+    """What two objects are compared by, in the rest frame at a diagonal of 1; K parts, the root first."""
 
     cloud: Array
+    """(N, 3) float. Dense points of the whole surface, at rest."""
     part_clouds: tuple[Array, ...]
+    """Dense points of each part's surface, at rest."""
     box_center: Array
     box_size: Array
+    """(K, 3) float."""
     turns: NDArray[np.bool_]
+    """(K,) bool. Whether the part's joint turns (revolute, continuous, screw)."""
     axis: Array
     origin: Array
+    """(K, 3) float. Of the joints, at rest."""
     limits: Array
+    """(K, 2) float. From the rest state on, in radians or diagonals; a full turn either way where there are none."""
 
     @cached_property
     def surface(self) -> Surface:
@@ -177,15 +162,10 @@ class Likeness:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A few points of a surface to measure distances from, and many to measure distances to.
-
-    Attributes
-    ----------
-    points : (N, 3) float
-    tree : cKDTree
-    """
+    """A few points of a surface to measure distances from, and many to measure distances to."""
 
     points: Array
+    """(N, 3) float."""
     tree: cKDTree
 
 
@@ -298,18 +278,12 @@ def _axis_distance(a: Likeness, i: int, b: Likeness, j: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Realism:
-    """How a category's procedural objects stand to its real ones; N procedural, R real, in diagonals.
-
-    Attributes
-    ----------
-    to_real : (N, R, 5) float
-        Distances by each of ``MEASURES``.
-    between_real : (P, 5) float
-        Distances of all pairs of real objects that serve as the yardstick.
-    """
+    """How a category's procedural objects stand to its real ones; N procedural, R real, in diagonals."""
 
     to_real: Array
+    """(N, R, 5) float. Distances by each of ``MEASURES``."""
     between_real: Array
+    """(P, 5) float. Distances of all pairs of real objects that serve as the yardstick."""
 
     @property
     def coverage(self) -> Array:

@@ -39,29 +39,20 @@ _FRONT, _UP = (-1.0, -0.7, 0.6), (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True)
 class PageFrame:
-    """One of the things that a page shows by turns: a sample, or a step of an estimate.
-
-    Attributes
-    ----------
-    name : str
-    points : (N, 3) float, optional
-        Metres, in the frame of the page.
-    part : (N,) int, optional
-        Part of each point; below 0 for none.
-    T_page_part : (K, 4, 4) float, optional
-    box_center, box_size : (K, 3) float, optional
-        Boxes in the frames of their parts.
-    arrows : sequence of (part, start, end)
-        Joint axes, (3,) each in the frame of the page.
-    """
+    """One of the things that a page shows by turns: a sample, or a step of an estimate."""
 
     name: str
     points: NDArray[Any] | None = None
+    """(N, 3) float, optional. Metres, in the frame of the page."""
     part: NDArray[Any] | None = None
+    """(N,) int, optional. Part of each point; below 0 for none."""
     T_page_part: Array | None = None
+    """(K, 4, 4) float, optional."""
     box_center: Array | None = None
     box_size: Array | None = None
+    """(K, 3) float, optional. Boxes in the frames of their parts."""
     arrows: Sequence[tuple[int, Array, Array]] = ()
+    """sequence of (part, start, end). Joint axes, (3,) each in the frame of the page."""
 
     def to_json(self) -> dict[str, Any]:
         """What the page reads."""
@@ -83,34 +74,23 @@ class PageFrame:
 
 @dataclass(frozen=True)
 class PageContent:
-    """What a page shows besides its frames.
-
-    Attributes
-    ----------
-    title : str
-    part_names : sequence of str
-    joint_types : sequence of str
-        One for each part.
-    notes, warnings : sequence of str
-        Paragraphs.
-    frame_word : str
-        What the frames are called.
-    first_frame : int
-    table : (title, head, rows), optional
-    up, seen_from : (3,) float
-        Which way is up, and from where the page looks first, in the frame of the page.
-    """
+    """What a page shows besides its frames."""
 
     title: str
     part_names: Sequence[str]
     joint_types: Sequence[str]
+    """One for each part."""
     notes: Sequence[str] = ()
     warnings: Sequence[str] = ()
+    """Paragraphs."""
     frame_word: str = "Sample"
+    """What the frames are called."""
     first_frame: int = 0
     table: tuple[str, Sequence[str], Sequence[Sequence[str]]] | None = None
+    """(title, head, rows), optional."""
     up: tuple[float, float, float] = (0.0, -1.0, 0.0)
     seen_from: tuple[float, float, float] = (0.0, 0.0, -1.0)
+    """(3,) float. Which way is up, and from where the page looks first, in the frame of the page."""
     hidden: Sequence[str] = field(default=())
 
 

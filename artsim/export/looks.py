@@ -22,27 +22,20 @@ MATERIALS_FILE = "materials.mtl"
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """What of a link's surface is of one material.
-
-    Attributes
-    ----------
-    name : str
-        Of its mesh, where it has a file of its own.
-    material : str
-        Key of :attr:`Finish.materials`.
-    vertices, normals : (N, 3) float
-        Rest frame, metres.
-    uv : (N, 2) float
-        Places on the texture, from its lower left corner, the whole being 1 wide and high; it repeats beyond.
-    faces : (F, 3) int
-    """
+    """What of a link's surface is of one material."""
 
     name: str
+    """Of its mesh, where it has a file of its own."""
     material: str
+    """Key of :attr:`Finish.materials`."""
     vertices: Array
     normals: Array
+    """(N, 3) float. Rest frame, metres."""
     uv: Array
+    """(N, 2) float. Places on the texture, from its lower left corner, the whole being 1 wide and high; it repeats
+    beyond."""
     faces: NDArray[np.int32]
+    """(F, 3) int."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,12 +38,7 @@ _YES, _NO = ("yes", "true"), ("no", "false")
 
 @dataclass(frozen=True)
 class Constraints:
-    """Wanted values by name, in alphabetical order of the names.
-
-    Attributes
-    ----------
-    wanted : tuple of (str, Wanted)
-    """
+    """Wanted values by name, in alphabetical order of the names."""
 
     wanted: tuple[tuple[str, Wanted], ...] = ()
 

@@ -95,26 +95,17 @@ def check_copies(faces: int, where: Path, limits: LoadLimits) -> None:
 
 @dataclass
 class MeshReader:
-    """Reads the meshes of one URDF file.
-
-    Attributes
-    ----------
-    folder : Path
-        The URDF file's folder: the root of relative paths.
-    package_roots : mapping of str to Path
-        Folder of each declared ``package://`` name.
-    limits : LoadLimits
-    contents : list of bytes
-        Bytes of every mesh file read, in order: they are part of the object's digest.
-    notes : list of Repair
-        What was left out, assumed or mended in mesh files.
-    """
+    """Reads the meshes of one URDF file."""
 
     folder: Path
+    """The URDF file's folder: the root of relative paths."""
     package_roots: Mapping[str, Path]
+    """Folder of each declared ``package://`` name."""
     limits: LoadLimits
     contents: list[bytes] = field(default_factory=list)
+    """Bytes of every mesh file read, in order: they are part of the object's digest."""
     notes: list[Repair] = field(default_factory=list)
+    """What was left out, assumed or mended in mesh files."""
     num_faces: int = 0
     _num_bytes: int = 0
     _paths: dict[str, Path] = field(default_factory=dict)

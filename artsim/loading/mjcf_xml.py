@@ -72,29 +72,19 @@ _NO_MESH = "0 0 0 1e-3 0 0 0 1e-3 0 0 0 1e-3"
 
 @dataclass
 class SafeMjcf:
-    """A document that MuJoCo may parse.
-
-    Attributes
-    ----------
-    text : str
-    meshes : dict
-        Name of each mesh that is a file: the file's name, from the document's folder on.
-    unread : set of str
-        Names of meshes that only a plugin makes: a speck stands for each.
-    left_out : tuple of str
-        Elements that show something or make bodies, and are not read.
-    total_mass : str or None
-        What all bodies together weigh, kg, where the document says so.
-    contents : list of bytes
-        Included files.
-    """
+    """A document that MuJoCo may parse."""
 
     text: str
     meshes: dict[str, str]
+    """Name of each mesh that is a file: the file's name, from the document's folder on."""
     unread: set[str] = field(default_factory=set)
+    """Names of meshes that only a plugin makes: a speck stands for each."""
     left_out: tuple[str, ...] = ()
+    """Elements that show something or make bodies, and are not read."""
     total_mass: str | None = None
+    """What all bodies together weigh, kg, where the document says so."""
     contents: list[bytes] = field(default_factory=list)
+    """Included files."""
 
 
 def is_mjcf(data: bytes, where: Path) -> bool:

@@ -50,27 +50,17 @@ T_BASE_MESH = np.array([[0.0, 0.0, -1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, 1.0,
 
 @dataclass(frozen=True, eq=False)
 class _Body:
-    """A rigid body of the annotation.
-
-    Attributes
-    ----------
-    number, parent : int
-    kind : str
-        Of its joint.
-    label : str
-    parts : tuple of int
-    origin, axis : (3,) float
-        Of its joint; the axis is 0 where it has none.
-    limit : dict
-    """
+    """A rigid body of the annotation."""
 
     number: int
     parent: int
     kind: str
+    """Of its joint."""
     label: str
     parts: tuple[int, ...]
     origin: Array
     axis: Array
+    """(3,) float. Of its joint; the axis is 0 where it has none."""
     limit: dict[str, Any]
 
     @property

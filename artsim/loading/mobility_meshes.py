@@ -40,22 +40,15 @@ _SHOWN = 5
 
 @dataclass(frozen=True)
 class PartMeshes:
-    """What is known of the meshes.
-
-    Attributes
-    ----------
-    of_part, of_link : mapping of int to list of Geometry
-        By the number of a part, and by that of a body.
-    where : str
-        Where they were looked for, for messages.
-    contents : list of bytes
-        Files that tell which mesh is whose.
-    """
+    """What is known of the meshes."""
 
     of_part: Mapping[int, list[Geometry]]
     where: str
+    """Where they were looked for, for messages."""
     of_link: Mapping[int, list[Geometry]] = field(default_factory=dict)
+    """By the number of a part, and by that of a body."""
     contents: list[bytes] = field(default_factory=list)
+    """Files that tell which mesh is whose."""
 
 
 def part_meshes(

@@ -53,21 +53,14 @@ class MissingFileError(Exception):
 
 @dataclass
 class AssetPaths:
-    """Resolves the file names of one URDF or MJCF file.
-
-    Attributes
-    ----------
-    folder : Path
-        The URDF file's folder: the root of relative names.
-    declared : mapping of str to Path
-        Folder of each declared package.
-    repairs : list of Repair
-        What was assumed so far.
-    """
+    """Resolves the file names of one URDF or MJCF file."""
 
     folder: Path
+    """The URDF file's folder: the root of relative names."""
     declared: Mapping[str, Path]
+    """Folder of each declared package."""
     repairs: list[Repair] = field(default_factory=list)
+    """What was assumed so far."""
     _said: set[str] = field(default_factory=set)
     _folders: dict[Path, Path] = field(default_factory=dict)
     _first: dict[str, Path] = field(default_factory=dict)

@@ -26,34 +26,23 @@ _MAX_NAME = 200
 
 @dataclass(frozen=True)
 class SideFiles:
-    """What stands beside a URDF file.
-
-    Attributes
-    ----------
-    object_id, category : str or None
-        From ``meta.json``.
-    labels : dict
-        Link name -> semantic name, from ``semantics.txt``.
-    num_movable : int or None
-        Movable joints as first annotated (``mobility_v2.json``, else ``semantics.txt``).
-    parts : tuple of str
-        Links that are parts, in order; empty unless artsim itself wrote the folder.
-    helpers : tuple of str
-        Links without a shape that stand between the two joints of a screw, as far as ``meta.json`` says so.
-    repairs : tuple of Repair
-        Side files that could not be read.
-    contents : tuple of bytes
-        Bytes of the files used, part of the object's digest.
-    """
+    """What stands beside a URDF file."""
 
     object_id: str | None = None
     category: str | None = None
+    """From ``meta.json``."""
     labels: dict[str, str] = field(default_factory=dict)
+    """Link name -> semantic name, from ``semantics.txt``."""
     num_movable: int | None = None
+    """Movable joints as first annotated (``mobility_v2.json``, else ``semantics.txt``)."""
     parts: tuple[str, ...] = ()
+    """Links that are parts, in order; empty unless artsim itself wrote the folder."""
     helpers: tuple[str, ...] = ()
+    """Links without a shape that stand between the two joints of a screw, as far as ``meta.json`` says so."""
     repairs: tuple[Repair, ...] = ()
+    """Side files that could not be read."""
     contents: tuple[bytes, ...] = ()
+    """Bytes of the files used, part of the object's digest."""
 
 
 GAPARTNET = "mobility_annotation_gapartnet.urdf"

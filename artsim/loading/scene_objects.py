@@ -27,55 +27,36 @@ _MOVING = ("revolute", "continuous", "prismatic")
 
 @dataclass(frozen=True, eq=False)
 class WorldJoint:
-    """A joint in the world's frame, at the zero of all joints.
-
-    Attributes
-    ----------
-    name, type : str
-        As of :class:`~artsim.loading.urdf_document.UrdfJoint`.
-    anchor : (3,) float
-        A point on the axis, metres.
-    axis : (3,) float
-        Unit.
-    lower, upper : float
-        Radians or metres; infinite where there is no end.
-    mimic : MimicRelation or None
-    dynamics : JointDynamics
-    """
+    """A joint in the world's frame, at the zero of all joints."""
 
     name: str
     type: str
+    """As of :class:`~artsim.loading.urdf_document.UrdfJoint`."""
     anchor: Array
+    """(3,) float. A point on the axis, metres."""
     axis: Array
+    """(3,) float. Unit."""
     lower: float = -np.inf
     upper: float = np.inf
+    """Radians or metres; infinite where there is no end."""
     mimic: MimicRelation | None = None
     dynamics: JointDynamics = UNKNOWN_DYNAMICS
 
 
 @dataclass(eq=False)
 class WorldLink:
-    """A link in the world's frame, at the zero of all joints.
-
-    Attributes
-    ----------
-    name : str
-    parent : int
-        Index of the link that carries it; -1 for the world.
-    joint : WorldJoint or None
-        None for the world.
-    shapes, collision : list of Shape
-        What it shows and what collides; their origins map to the world's frame.
-    inertia : Inertia or None
-        In the world's frame.
-    """
+    """A link in the world's frame, at the zero of all joints."""
 
     name: str
     parent: int = -1
+    """Index of the link that carries it; -1 for the world."""
     joint: WorldJoint | None = None
+    """None for the world."""
     shapes: list[Shape] = field(default_factory=list)
     collision: list[Shape] = field(default_factory=list)
+    """What it shows and what collides; their origins map to the world's frame."""
     inertia: Inertia | None = None
+    """In the world's frame."""
 
 
 def chosen(links: Sequence[WorldLink], file: Path, repairs: list[Repair], body: str | None = None) -> list[WorldLink]:

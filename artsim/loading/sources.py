@@ -20,27 +20,18 @@ from artsim.model.objects import ArticulatedObject
 
 @dataclass(frozen=True)
 class FileSource:
-    """An object to load from a file.
-
-    Attributes
-    ----------
-    path : Path
-        URDF, MJCF, USD or joint file.
-    name : str
-        Path from the folder that was named (or holds the file that was) on: stable when that folder moves.
-    sha256 : str
-        Digest of the file.
-    package_roots : mapping of str to Path
-        For ``package://`` meshes.
-    body : str or None
-        Which object of a scene; see :func:`artsim.load`.
-    """
+    """An object to load from a file."""
 
     path: Path
+    """URDF, MJCF, USD or joint file."""
     name: str
+    """Path from the folder that was named (or holds the file that was) on: stable when that folder moves."""
     sha256: str
+    """Digest of the file."""
     package_roots: Mapping[str, Path] = field(default_factory=dict)
+    """For ``package://`` meshes."""
     body: str | None = None
+    """Which object of a scene; see :func:`artsim.load`."""
 
     def load(self) -> ArticulatedObject:
         """The object."""
@@ -51,19 +42,12 @@ class FileSource:
 
 @dataclass(frozen=True)
 class FamilySource:
-    """A procedural object to make.
-
-    Attributes
-    ----------
-    category : str
-    seed : int
-    constraints : Constraints
-        Of :func:`artsim.make`.
-    """
+    """A procedural object to make."""
 
     category: str
     seed: int
     constraints: Constraints = NO_CONSTRAINTS
+    """Of :func:`artsim.make`."""
 
     @staticmethod
     def named(name: str) -> FamilySource | None:

@@ -81,44 +81,28 @@ Geometry: TypeAlias = Box | Cylinder | Capsule | Sphere | MeshFile | InlineMesh
 
 @dataclass(frozen=True)
 class Shape:
-    """A geometry in its link.
-
-    Attributes
-    ----------
-    geometry : Geometry
-    origin : (4, 4) float
-        Maps the geometry's frame to the link's.
-    """
+    """A geometry in its link."""
 
     geometry: Geometry
     origin: Array
+    """(4, 4) float. Maps the geometry's frame to the link's."""
 
 
 @dataclass(frozen=True)
 class UrdfLink:
-    """A link.
-
-    Attributes
-    ----------
-    name : str
-    shapes : tuple of Shape
-        What it shows.
-    unusable : tuple of str
-        Why other shapes of it cannot be shown.
-    empty : tuple of str
-        What shapes of it have no extent, so that there is nothing to show.
-    collision : tuple of Shape
-        What collides; of MJCF and USD alone.
-    inertia : Inertia or None
-        In the link's frame; of MJCF and USD alone.
-    """
+    """A link."""
 
     name: str
     shapes: tuple[Shape, ...] = ()
+    """What it shows."""
     unusable: tuple[str, ...] = ()
+    """Why other shapes of it cannot be shown."""
     empty: tuple[str, ...] = ()
+    """What shapes of it have no extent, so that there is nothing to show."""
     collision: tuple[Shape, ...] = ()
+    """What collides; of MJCF and USD alone."""
     inertia: Inertia | None = None
+    """In the link's frame; of MJCF and USD alone."""
 
 
 @dataclass(frozen=True)
@@ -132,57 +116,37 @@ class MimicRelation:
 
 @dataclass(frozen=True)
 class UrdfJoint:
-    """A joint.
-
-    Attributes
-    ----------
-    name, type, parent, child : str
-        Type is revolute, continuous, prismatic, fixed or floating; parent and child are links.
-    origin : (4, 4) float
-        Maps the joint's frame at zero to the parent's.
-    axis : (3,) float
-        Unit vector in the joint's frame.
-    lower, upper : float
-        Radians or metres; infinite where it turns freely.
-    mimic : MimicRelation or None
-    dynamics : JointDynamics
-        Of MJCF and USD alone.
-    """
+    """A joint."""
 
     name: str
     type: str
     parent: str
     child: str
+    """Type is revolute, continuous, prismatic, fixed or floating; parent and child are links."""
     origin: Array
+    """(4, 4) float. Maps the joint's frame at zero to the parent's."""
     axis: Array
+    """(3,) float. Unit vector in the joint's frame."""
     lower: float
     upper: float
+    """Radians or metres; infinite where it turns freely."""
     mimic: MimicRelation | None = None
     dynamics: JointDynamics = UNKNOWN_DYNAMICS
+    """Of MJCF and USD alone."""
 
 
 @dataclass(frozen=True)
 class UrdfRobot:
-    """Links and joints in the document's order.
-
-    Attributes
-    ----------
-    links : tuple of UrdfLink
-    joints : tuple of UrdfJoint
-    explicit : bool
-        Whether it says of every joint that follows another that it does. PartNet-Mobility's URDF files leave it unsaid
-        how far a screw goes for each turn.
-    labels : mapping of str to str
-        What links are, where the document says so.
-    helpers : tuple of str
-        Links without a shape between the two joints of a screw.
-    noun : str
-        What the document calls a link, for messages.
-    """
+    """Links and joints in the document's order."""
 
     links: tuple[UrdfLink, ...]
     joints: tuple[UrdfJoint, ...]
     explicit: bool = False
+    """Whether it says of every joint that follows another that it does. PartNet-Mobility's URDF files leave it unsaid
+    how far a screw goes for each turn."""
     labels: Mapping[str, str] = field(default_factory=dict)
+    """What links are, where the document says so."""
     helpers: tuple[str, ...] = ()
+    """Links without a shape between the two joints of a screw."""
     noun: str = "link"
+    """What the document calls a link, for messages."""

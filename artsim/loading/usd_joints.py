@@ -54,27 +54,18 @@ class FreeAxis:
 
 @dataclass(eq=False)
 class UsdJoint:
-    """A joint between two bodies.
-
-    Attributes
-    ----------
-    name : str
-    prim : Usd.Prim
-    bodies : (int, int)
-    frames : pair of (4, 4) float
-        The joint's frame in each of them, rigid.
-    free : list of FreeAxis
-        From the first body to the second; empty where it holds.
-    static : tuple of str
-        Paths of what it names that is no body.
-    """
+    """A joint between two bodies."""
 
     name: str
     prim: Any
     bodies: tuple[int, int]
+    """(int, int)."""
     frames: tuple[Array, Array]
+    """pair of (4, 4) float. The joint's frame in each of them, rigid."""
     free: list[FreeAxis]
+    """From the first body to the second; empty where it holds."""
     static: tuple[str, ...]
+    """Paths of what it names that is no body."""
 
 
 def read_joints(reader: StageReader) -> list[UsdJoint]:

@@ -28,15 +28,10 @@ Along = float | tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A union of convex pieces.
-
-    Attributes
-    ----------
-    pieces : tuple of Manifold
-        Each convex. They may overlap or touch one another.
-    """
+    """A union of convex pieces."""
 
     pieces: tuple[Manifold, ...] = ()
+    """Each convex. They may overlap or touch one another."""
 
     def __add__(self, other: Solid) -> Solid:
         return Solid(self.pieces + other.pieces)

@@ -30,19 +30,13 @@ JOINT_STATES = 64
 
 @dataclass(frozen=True)
 class Collision:
-    """Two parts that overlap.
-
-    Attributes
-    ----------
-    parts : tuple of 2 int
-    state : (K,) float
-    depth : float
-        Mean thickness of the overlap in metres; infinite where a surface is not closed, so that it has none.
-    """
+    """Two parts that overlap."""
 
     parts: tuple[int, int]
     state: Array
+    """(K,) float."""
     depth: float
+    """Mean thickness of the overlap in metres; infinite where a surface is not closed, so that it has none."""
 
 
 def sweep_states(obj: ArticulatedObject) -> Array:

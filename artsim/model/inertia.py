@@ -13,21 +13,14 @@ from artsim.model.kinematics import Array
 
 @dataclass(frozen=True, eq=False)
 class Inertia:
-    """What a rigid body opposes to being pushed and turned.
-
-    Attributes
-    ----------
-    mass : float
-        kg.
-    center : (3,) float
-        Centre of mass in the rest frame, at rest, metres.
-    tensor : (3, 3) float
-        About the centre of mass, along the axes of the rest frame, kg m^2.
-    """
+    """What a rigid body opposes to being pushed and turned."""
 
     mass: float
+    """kg."""
     center: Array
+    """(3,) float. Centre of mass in the rest frame, at rest, metres."""
     tensor: Array
+    """(3, 3) float. About the centre of mass, along the axes of the rest frame, kg m^2."""
 
     def about(self, point: Array, axis: Array) -> float:
         """Moment of inertia about an axis (unit, (3,)) through a point, kg m^2."""

@@ -35,40 +35,27 @@ class Mimic:
 
 @dataclass(frozen=True)
 class Joint:
-    """The joint that carries one part.
-
-    Attributes
-    ----------
-    name : str
-        Name in the source file.
-    type : str
-        One of ``JOINT_TYPES``.
-    parent : int
-        Index of the parent part; -1 for the root.
-    axis : (3,) tuple
-        Unit direction in the rest frame, at rest.
-    origin : (3,) tuple
-        A point on the axis in the rest frame, at rest, metres.
-    lower, upper : float
-        Limits in radians (revolute, screw) or metres (prismatic); infinite for ``continuous``.
-    rest : float
-        State in which the object is in its rest state.
-    pitch : float
-        Screw joints only: metres along the axis for each radian about it.
-    mimic : Mimic or None
-        Set when the state follows another joint.
-    """
+    """The joint that carries one part."""
 
     name: str
+    """Name in the source file."""
     type: str
+    """One of ``JOINT_TYPES``."""
     parent: int
+    """Index of the parent part; -1 for the root."""
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    """Unit direction in the rest frame, at rest."""
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """A point on the axis in the rest frame, at rest, metres."""
     lower: float = 0.0
     upper: float = 0.0
+    """Limits in radians (revolute, screw) or metres (prismatic); infinite for ``continuous``."""
     rest: float = 0.0
+    """State in which the object is in its rest state."""
     pitch: float = 0.0
+    """Screw joints only: metres along the axis for each radian about it."""
     mimic: Mimic | None = None
+    """Set when the state follows another joint."""
 
 
 def joint_record(joint: Joint) -> dict[str, Any]:

@@ -32,21 +32,14 @@ MAX_PARTS = 254
 
 @dataclass(frozen=True)
 class Repair:
-    """One thing in a source file that was mended or left out while loading.
-
-    Attributes
-    ----------
-    where : str
-        Element concerned, for example ``joint 'joint_2'``.
-    what : str
-        What was found and what was done about it.
-    note : bool
-        Whether the object is all that the file says, nothing of which was assumed, changed or dropped.
-    """
+    """One thing in a source file that was mended or left out while loading."""
 
     where: str
+    """Element concerned, for example ``joint 'joint_2'``."""
     what: str
+    """What was found and what was done about it."""
     note: bool = False
+    """Whether the object is all that the file says, nothing of which was assumed, changed or dropped."""
 
     def __str__(self) -> str:
         return printable(f"{self.where}: {self.what}", _MAX_REPAIR)
@@ -58,20 +51,14 @@ Mesh = tuple[Array, NDArray[np.int32]]
 
 @dataclass(frozen=True)
 class JointDynamics:
-    """What drives and opposes the motion of a joint, at native size; None where the source file does not say.
-
-    Attributes
-    ----------
-    effort, velocity : float or None
-        Limits: N m or N, rad/s or m/s.
-    damping, friction : float or None
-        N m s or N s/m; N m or N.
-    """
+    """What drives and opposes the motion of a joint, at native size; None where the source file does not say."""
 
     effort: float | None = None
     velocity: float | None = None
+    """Limits: N m or N, rad/s or m/s."""
     damping: float | None = None
     friction: float | None = None
+    """N m s or N s/m; N m or N."""
 
 
 UNKNOWN_DYNAMICS = JointDynamics()
@@ -80,55 +67,37 @@ UNKNOWN_DYNAMICS = JointDynamics()
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """What physics needs of a part.
-
-    Attributes
-    ----------
-    pieces : tuple of Mesh
-        Collision geometry in the rest frame, at rest, native units. That of procedural objects is convex, and its union
-        is the part's surface.
-    density : float
-        kg/m^3.
-    solid : Mesh or None
-        Closed surface of what has the mass, where the part's own surface need not be closed.
-    inertia : Inertia or None
-        What the source file says of it, in native units; it counts instead of what follows from surface and density.
-    joint : JointDynamics
-        Of the joint that carries the part.
-    """
+    """What physics needs of a part."""
 
     pieces: tuple[Mesh, ...]
+    """Collision geometry in the rest frame, at rest, native units. That of procedural objects is convex, and its union
+    is the part's surface."""
     density: float
+    """kg/m^3."""
     solid: Mesh | None = None
+    """Closed surface of what has the mass, where the part's own surface need not be closed."""
     inertia: Inertia | None = None
+    """What the source file says of it, in native units; it counts instead of what follows from surface and density."""
     joint: JointDynamics = UNKNOWN_DYNAMICS
+    """Of the joint that carries the part."""
 
     __repr__ = brief
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One rigid part.
-
-    Attributes
-    ----------
-    name : str
-        Link name in the source file.
-    label : str
-        Semantic name where the source gives one ("lid", "drawer"), else the link name.
-    vertices : (V, 3) float
-        In the rest frame, at rest, native units (before the object's scale).
-    faces : (F, 3) int32
-        Triangles; empty for a part without geometry.
-    body : Body or None
-        Where the source knows it: procedural objects do.
-    """
+    """One rigid part."""
 
     name: str
+    """Link name in the source file."""
     label: str
+    """Semantic name where the source gives one ("lid", "drawer"), else the link name."""
     vertices: Array
+    """(V, 3) float. In the rest frame, at rest, native units (before the object's scale)."""
     faces: NDArray[np.int32]
+    """(F, 3) int32. Triangles; empty for a part without geometry."""
     body: Body | None = None
+    """Where the source knows it: procedural objects do."""
 
     __repr__ = brief
 

@@ -56,63 +56,42 @@ class MeshShape:
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """One rigid body.
-
-    Attributes
-    ----------
-    name : str
-    part : int
-        The part that it is; -1 for the helper link between the two joints of a screw, which has no shape.
-    origin : (3,) float
-        Its frame's origin in the rest frame, at rest, metres. Axes are those of the rest frame.
-    inertia : Inertia
-    visual : MeshShape or None
-    collision : tuple of BoxShape or MeshShape
-        Each convex.
-    """
+    """One rigid body."""
 
     name: str
     part: int
+    """The part that it is; -1 for the helper link between the two joints of a screw, which has no shape."""
     origin: Array
+    """(3,) float. Its frame's origin in the rest frame, at rest, metres. Axes are those of the rest frame."""
     inertia: Inertia
     visual: MeshShape | None = None
     collision: tuple[BoxShape | MeshShape, ...] = ()
+    """Each convex."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinkJoint:
-    """A revolute, continuous or prismatic joint between two links, at the child's frame origin.
-
-    Attributes
-    ----------
-    name, type : str
-    parent, child : int
-        Links.
-    axis : (3,) float
-        Unit.
-    lower, upper : float
-        Radians or metres; infinite where it turns without end. A screw's turning joint is ``continuous`` and has limits
-        nevertheless: URDF holds them in the sliding joint alone.
-    effort, velocity : float
-        Limits: N m or N, rad/s or m/s.
-    damping, friction : float
-        N m s or N s/m; N m or N.
-    mimic : tuple or None
-        Name of the joint followed, multiplier, offset.
-    """
+    """A revolute, continuous or prismatic joint between two links, at the child's frame origin."""
 
     name: str
     type: str
     parent: int
     child: int
+    """Links."""
     axis: Array
+    """(3,) float. Unit."""
     lower: float
     upper: float
+    """Radians or metres; infinite where it turns without end. A screw's turning joint is ``continuous`` and has limits
+    nevertheless: URDF holds them in the sliding joint alone."""
     effort: float
     velocity: float
+    """Limits: N m or N, rad/s or m/s."""
     damping: float
     friction: float
+    """N m s or N s/m; N m or N."""
     mimic: tuple[str, float, float] | None = None
+    """Name of the joint followed, multiplier, offset."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,16 +26,11 @@ PARALLEL = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class AxisMap:
-    """A map of one coordinate: linear between knots, and a shift beyond the outermost.
-
-    Attributes
-    ----------
-    knots, goals : (N,) float
-        Ascending. Without any, nothing moves.
-    """
+    """A map of one coordinate: linear between knots, and a shift beyond the outermost."""
 
     knots: Array
     goals: Array
+    """(N,) float. Ascending. Without any, nothing moves."""
 
     def __call__(self, values: Array) -> Array:
         """Where coordinates go."""

@@ -153,17 +153,12 @@ class LateralJitter:
 
     On a surface the depth there is interpolated (1/z linearly, which is exact on planes); at edges it is that of the
     nearest pixel.
-
-    Attributes
-    ----------
-    sigma_px : float
-        Standard deviation along each image axis, pixels of the device, at normal incidence.
-    grazing_px : float
-        Added times th / (pi / 2 - th) at incidence th (Nguyen, Izadi and Lovell 2012).
     """
 
     sigma_px: float
+    """Standard deviation along each image axis, pixels of the device, at normal incidence."""
     grazing_px: float = 0.0
+    """Added times th / (pi / 2 - th) at incidence th (Nguyen, Izadi and Lovell 2012)."""
 
     def read(self, view: PixelView, depth: Array, focal: float, stream: int) -> Array:
         sigma = self._sigma_px(view.incidence) if self.grazing_px else np.full(len(depth), self.sigma_px)
@@ -195,18 +190,12 @@ class LateralJitter:
 
 @dataclass(frozen=True)
 class DisparityQuantisation:
-    """Depth is measured as a disparity, in steps of a fraction of a pixel.
-
-    Attributes
-    ----------
-    step_px : float
-        Pixels of the device.
-    baseline : float
-        Metres.
-    """
+    """Depth is measured as a disparity, in steps of a fraction of a pixel."""
 
     step_px: float
+    """Pixels of the device."""
     baseline: float
+    """Metres."""
 
     def read(self, view: PixelView, depth: Array, focal: float, stream: int) -> Array:
         unit = focal * self.baseline / self.step_px  # disparity in steps, times depth
@@ -220,26 +209,18 @@ class DisparityQuantisation:
 
 @dataclass(frozen=True)
 class AxialNoise:
-    """Normal noise on the depth, its standard deviation a polynomial of the depth z.
-
-    Attributes
-    ----------
-    constant, linear, quadratic : float
-        ``constant + linear (z - start) + quadratic (z - start)^2`` metres.
-    start : float
-        Metres; nearer surfaces are taken to lie there if ``linear`` is set.
-    grazing : float
-        ``grazing / sqrt(z) * th^2 / (pi / 2 - th)^2`` is added at incidence th above 60 degrees.
-    measured_with : DisparityQuantisation, optional
-        An earlier step whose error is part of the standard deviation given: only the rest is added.
-    """
+    """Normal noise on the depth, its standard deviation a polynomial of the depth z."""
 
     constant: float = 0.0
     linear: float = 0.0
     quadratic: float = 0.0
+    """``constant + linear (z - start) + quadratic (z - start)^2`` metres."""
     start: float = 0.0
+    """Metres; nearer surfaces are taken to lie there if ``linear`` is set."""
     grazing: float = 0.0
+    """``grazing / sqrt(z) * th^2 / (pi / 2 - th)^2`` is added at incidence th above 60 degrees."""
     measured_with: DisparityQuantisation | None = None
+    """An earlier step whose error is part of the standard deviation given: only the rest is added."""
 
     def read(self, view: PixelView, depth: Array, focal: float, stream: int) -> Array:
         incidence = view.incidence if self.grazing else np.zeros(len(depth))
@@ -265,18 +246,12 @@ class AxialNoise:
 
 @dataclass(frozen=True)
 class _AtEdges:
-    """What happens to pixels beside a jump in depth.
-
-    Attributes
-    ----------
-    jump : float
-        Range of the depths in the 3x3 pixels around, metres, from which it happens.
-    chance : float
-        Probability that it does.
-    """
+    """What happens to pixels beside a jump in depth."""
 
     jump: float
+    """Range of the depths in the 3x3 pixels around, metres, from which it happens."""
     chance: float
+    """Probability that it does."""
 
     def happens(self, view: PixelView, stream: int) -> tuple[NDArray[np.bool_], Array, Array]:
         """Where it does, and the nearest and farthest depth around each pixel."""
@@ -299,15 +274,10 @@ class EdgeDropout(_AtEdges):
 
 @dataclass(frozen=True)
 class FlyingPixels(_AtEdges):
-    """Pixels beside a jump in depth mix the light of both sides: the reading, if any, lies anywhere between them.
-
-    Attributes
-    ----------
-    reach : float
-        Metres behind the nearer side that a reading lies at most.
-    """
+    """Pixels beside a jump in depth mix the light of both sides: the reading, if any, lies anywhere between them."""
 
     reach: float
+    """Metres behind the nearer side that a reading lies at most."""
 
     def read(self, view: PixelView, depth: Array, focal: float, stream: int) -> Array:
         flies, near, far = self.happens(view, stream)

@@ -32,17 +32,12 @@ _DENSE, _PROBES = 20_000, 500
 
 @dataclass(frozen=True, eq=False)
 class Symmetry:
-    """An object in its rest frame equals itself turned, with its parts renumbered.
-
-    Attributes
-    ----------
-    rotation : (3, 3) float
-        Maps the place of part k to that of part ``parts[k]``, about the origin of the rest frame.
-    parts : (K,) int64
-    """
+    """An object in its rest frame equals itself turned, with its parts renumbered."""
 
     rotation: Array
+    """(3, 3) float. Maps the place of part k to that of part ``parts[k]``, about the origin of the rest frame."""
     parts: NDArray[np.int64]
+    """(K,) int64."""
 
 
 def symmetries(obj: ArticulatedObject, tolerance: float = TOLERANCE) -> tuple[Symmetry, ...]:

@@ -33,26 +33,18 @@ _MAX_BYTES = 64_000_000
 
 @dataclass(frozen=True)
 class GraspFiles:
-    """What a run did.
-
-    Attributes
-    ----------
-    objects, made : int
-        All, and those that were not there yet.
-    parts, graspable, grasped : int
-        Movable parts; those with room for a hand; those of which a grasp was proved.
-    grasps : int
-    failed : tuple of str
-        Objects that could not be made, and why.
-    """
+    """What a run did."""
 
     objects: int
     made: int
+    """All, and those that were not there yet."""
     parts: int
     graspable: int
     grasped: int
+    """Movable parts; those with room for a hand; those of which a grasp was proved."""
     grasps: int
     failed: tuple[str, ...]
+    """Objects that could not be made, and why."""
 
 
 def write_grasps(

@@ -67,26 +67,18 @@ class Gripper:
 
 @dataclass(frozen=True, eq=False)
 class Grasps:
-    """Kept grasps of an object.
-
-    Attributes
-    ----------
-    part : (G,) int64
-    T_part_grasp : (G, 4, 4) float
-        Metres, at the object's scale.
-    width : (G,) float
-        Between the pads as they hold, metres.
-    opened : (G,) float
-        How far the joint was opened in the proof, radians or metres.
-    tried : (K,) int64
-        Candidates of each part that were tried in physics; 0 where no hand has room.
-    """
+    """Kept grasps of an object."""
 
     part: NDArray[np.int64]
+    """(G,) int64."""
     T_part_grasp: Array
+    """(G, 4, 4) float. Metres, at the object's scale."""
     width: Array
+    """(G,) float. Between the pads as they hold, metres."""
     opened: Array
+    """(G,) float. How far the joint was opened in the proof, radians or metres."""
     tried: NDArray[np.int64]
+    """(K,) int64. Candidates of each part that were tried in physics; 0 where no hand has room."""
 
 
 def find_grasps(

@@ -27,18 +27,12 @@ _MISS = np.float32(1e30)
 
 @dataclass(frozen=True, eq=False)
 class RaySurface:
-    """What rays need of a part, made at first use and kept as long as the part.
-
-    Attributes
-    ----------
-    scene : RayScene
-        Acceleration structure, native units.
-    corners : (C, 3) float
-        Corners of a convex body around the part, native units.
-    """
+    """What rays need of a part, made at first use and kept as long as the part."""
 
     scene: RayScene
+    """Acceleration structure, native units."""
     corners: Array
+    """(C, 3) float. Corners of a convex body around the part, native units."""
 
 
 _surfaces: weakref.WeakKeyDictionary[Part, RaySurface] = weakref.WeakKeyDictionary()
@@ -55,25 +49,17 @@ def ray_surface(part: Part) -> RaySurface:
 
 @dataclass(frozen=True, eq=False)
 class PosedObject:
-    """An object in front of a camera: what rays need to know, worked out once per view.
-
-    Attributes
-    ----------
-    obj : ArticulatedObject
-    camera : Camera
-    T_camera_part : (K, 4, 4) float
-    spans : (K, 2, H) float
-        Columns between which each part's outline can cover the centres of a row of pixels; empty (inf, -inf) where it
-        does not.
-    row_ranges : (K, 2) int
-        First and end row of each part's spans.
-    """
+    """An object in front of a camera: what rays need to know, worked out once per view."""
 
     obj: ArticulatedObject
     camera: Camera
     T_camera_part: Array
+    """(K, 4, 4) float."""
     spans: NDArray[np.float32]
+    """(K, 2, H) float. Columns between which each part's outline can cover the centres of a row of pixels; empty (inf,
+    -inf) where it does not."""
     row_ranges: NDArray[np.int64]
+    """(K, 2) int. First and end row of each part's spans."""
 
     @cached_property
     def intrinsics(self) -> NDArray[np.float32]:

@@ -25,21 +25,14 @@ _CV_FROM_SAPIEN = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0, 
 
 @dataclass(frozen=True, eq=False)
 class Shadows:
-    """Where shadows are cast.
-
-    Attributes
-    ----------
-    center : (3,) float
-        Of what casts them, in the stage's frame.
-    radius : float
-        Of a sphere around it.
-    lit : float
-        Radius of the sphere that the sky lights.
-    """
+    """Where shadows are cast."""
 
     center: Array
+    """(3,) float. Of what casts them, in the stage's frame."""
     radius: float
+    """Of a sphere around it."""
     lit: float
+    """Radius of the sphere that the sky lights."""
 
 
 class Stage:

@@ -22,23 +22,15 @@ MAX_THINGS = 254
 
 @dataclass(frozen=True, eq=False)
 class Thing:
-    """An object that stands in a scene.
-
-    Attributes
-    ----------
-    obj : ArticulatedObject
-    q : (K,) float
-        Joint states, radians or metres.
-    T_world_object : (4, 4) float
-        Pose of the rest frame in the world.
-    coats : tuple of Coat, length K
-        How each part looks.
-    """
+    """An object that stands in a scene."""
 
     obj: ArticulatedObject
     q: Array
+    """(K,) float. Joint states, radians or metres."""
     T_world_object: Array
+    """(4, 4) float. Pose of the rest frame in the world."""
     coats: tuple[Coat, ...]
+    """How each part looks."""
 
     @cached_property
     def T_world_part(self) -> Array:
@@ -67,22 +59,14 @@ class Thing:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Things in a world whose Z axis points up.
-
-    Attributes
-    ----------
-    instances : tuple of Thing
-        Articulated objects: those with ground truth.
-    distractors : tuple of Thing
-        Rigid things of no interest.
-    supports : tuple of Thing
-        What the others stand on and before: table, floor, walls.
-    lights : Lights
-    """
+    """Things in a world whose Z axis points up."""
 
     instances: tuple[Thing, ...]
+    """Articulated objects: those with ground truth."""
     distractors: tuple[Thing, ...]
+    """Rigid things of no interest."""
     supports: tuple[Thing, ...]
+    """What the others stand on and before: table, floor, walls."""
     lights: Lights
 
     def __post_init__(self) -> None:
@@ -121,25 +105,17 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class SceneFrame:
-    """What a camera sees of a scene.
-
-    Attributes
-    ----------
-    depth : (H, W) float32
-        z-depth in metres, 0 = no return.
-    instance_ids : (H, W) uint8
-        Place in ``Scene.things`` of what is seen: articulated objects, then distractors, then supports;
-        ``BACKGROUND`` where nothing stands.
-    part_ids : (H, W) uint8
-        Part of the articulated object that is seen; ``BACKGROUND`` everywhere else.
-    rgb : (H, W, 3) uint8 or None
-        Colour, where the renderer makes it.
-    """
+    """What a camera sees of a scene."""
 
     depth: NDArray[np.float32]
+    """(H, W) float32. z-depth in metres, 0 = no return."""
     instance_ids: NDArray[np.uint8]
+    """(H, W) uint8. Place in ``Scene.things`` of what is seen: articulated objects, then distractors, then supports;
+    ``BACKGROUND`` where nothing stands."""
     part_ids: NDArray[np.uint8]
+    """(H, W) uint8. Part of the articulated object that is seen; ``BACKGROUND`` everywhere else."""
     rgb: NDArray[np.uint8] | None = None
+    """(H, W, 3) uint8 or None. Colour, where the renderer makes it."""
 
 
 _used: weakref.WeakKeyDictionary[Part, Array] = weakref.WeakKeyDictionary()

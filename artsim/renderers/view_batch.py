@@ -22,26 +22,19 @@ from artsim.model.objects import ArticulatedObject
 class Views:
     """B views, each of one object in one state by one camera, all of one image size.
 
-    Attributes
-    ----------
-    objects : (B,) int
-        Number of each view's object among those loaded.
-    q : (B, K) float
-        Joint states in radians or metres, as many as the object of most parts has; an object of fewer ignores the rest.
-    T_camera_object : (B, 4, 4) float
-        Pose of each object's rest frame in the camera.
-    K : (B, 3, 3) float
-        Intrinsic matrices in pixels.
-    width, height : int
-
     Arrays are NumPy's, or Warp's own (int32, float64, mat44d and mat33d) on the renderer's device, whose contents are
     not looked at before they are used.
     """
 
     objects: Any
+    """(B,) int. Number of each view's object among those loaded."""
     q: Any
+    """(B, K) float. Joint states in radians or metres, as many as the object of most parts has; an object of fewer
+    ignores the rest."""
     T_camera_object: Any
+    """(B, 4, 4) float. Pose of each object's rest frame in the camera."""
     K: Any
+    """(B, 3, 3) float. Intrinsic matrices in pixels."""
     width: int
     height: int
 
@@ -145,36 +138,23 @@ def _facing(azimuth: Array, elevation: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Images:
-    """What B views show, on the device.
-
-    Attributes
-    ----------
-    depth : (B, H, W) float32
-        z-depth in metres, 0 = no return.
-    part_ids : (B, H, W) uint8
-        255 where no part is seen.
-    T_camera_part : (B, K) mat44d
-        As an array (B, K, 4, 4); zero beyond an object's own parts.
-    """
+    """What B views show, on the device."""
 
     depth: Any
+    """(B, H, W) float32. z-depth in metres, 0 = no return."""
     part_ids: Any
+    """(B, H, W) uint8. 255 where no part is seen."""
     T_camera_part: Any
+    """(B, K) mat44d. As an array (B, K, 4, 4); zero beyond an object's own parts."""
 
 
 @dataclass(frozen=True, eq=False)
 class Clouds:
-    """Partial clouds of B views, on the device.
-
-    Attributes
-    ----------
-    points : (B, N) vec3
-        As an array (B, N, 3) float32: camera frame, metres.
-    part : (B, N) uint8
-        Part of each point; 255 throughout where the camera does not see the object.
-    T_camera_part : (B, K) mat44d
-    """
+    """Partial clouds of B views, on the device."""
 
     points: Any
+    """(B, N) vec3. As an array (B, N, 3) float32: camera frame, metres."""
     part: Any
+    """(B, N) uint8. Part of each point; 255 throughout where the camera does not see the object."""
     T_camera_part: Any
+    """(B, K) mat44d."""

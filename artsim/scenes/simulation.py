@@ -40,20 +40,13 @@ _MEETING = -1e-3
 
 @dataclass(frozen=True)
 class SceneFiles:
-    """What was written of a scene.
-
-    Attributes
-    ----------
-    folder : Path
-    names : tuple of str
-        Of the objects.
-    blocked : tuple of str
-        ``NAME/JOINT`` of joints that would meet another object somewhere in their range.
-    """
+    """What was written of a scene."""
 
     folder: Path
     names: tuple[str, ...]
+    """Of the objects."""
     blocked: tuple[str, ...]
+    """``NAME/JOINT`` of joints that would meet another object somewhere in their range."""
 
 
 def write_simulation(

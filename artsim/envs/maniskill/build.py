@@ -26,30 +26,22 @@ OBJECT_BIT = 28
 
 @dataclass(frozen=True, eq=False)
 class Built:
-    """An object of K parts and F free joints in a sub-scene, as an articulation with D degrees of freedom.
-
-    Attributes
-    ----------
-    articulation : ManiSkill's Articulation
-    links : list of PhysxArticulationLinkComponent, length K
-        Body of each part. Its frame stands at the part's joint, with the axes of the rest frame.
-    origins : (K, 3) float
-        Origin of each of these frames in the rest frame, at rest, metres.
-    place : (K,) int
-        Where the articulation's ``qpos`` holds the way of each part's joint from its rest state; 0 for the root.
-    follow : (D, F), offset : (D,) float
-        ``qpos = follow @ way + offset`` for the way of each free joint from its rest state: joints that follow others.
-    inertia : (D,) float
-        Of what each joint carries, at rest: kg m^2 or kg.
-    """
+    """An object of K parts and F free joints in a sub-scene, as an articulation with D degrees of freedom."""
 
     articulation: Any
     links: list[Any]
+    """Body of each part. Its frame stands at the part's joint, with the axes of the rest frame."""
     origins: Array
+    """(K, 3) float. Origin of each of these frames in the rest frame, at rest, metres."""
     place: NDArray[np.int64]
+    """(K,) int. Where the articulation's ``qpos`` holds the way of each part's joint from its rest state; 0 for the
+    root."""
     follow: Array
+    """(D, F), offset : (D,) float. ``qpos = follow @ way + offset`` for the way of each free joint from its rest state:
+    joints that follow others."""
     offset: Array
     inertia: Array
+    """(D,) float. Of what each joint carries, at rest: kg m^2 or kg."""
 
 
 def build(

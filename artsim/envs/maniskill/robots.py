@@ -11,24 +11,17 @@ NO_ROBOT = "none"
 
 @dataclass(frozen=True)
 class Start:
-    """How a robot of D joints begins, facing along its x axis.
-
-    Attributes
-    ----------
-    qpos : tuple of D float
-        Fingers come last.
-    fingers : int
-        Joints of the hand.
-    reach : float
-        From its base to the foremost point of its collision shapes, metres; 0 for a hand that floats.
-    room : (3,) float
-        Half of what it takes around its base in x and y, and its height, metres: shown by the camera that shows all.
-    """
+    """How a robot of D joints begins, facing along its x axis."""
 
     qpos: tuple[float, ...]
+    """Fingers come last."""
     fingers: int = 2
+    """Joints of the hand."""
     reach: float = 0.0
+    """From its base to the foremost point of its collision shapes, metres; 0 for a hand that floats."""
     room: tuple[float, float, float] = (0.2, 0.3, 0.8)
+    """(3,) float. Half of what it takes around its base in x and y, and its height, metres: shown by the camera that
+    shows all."""
 
 
 _PANDA = Start((0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4, 0.04, 0.04), reach=0.37)

@@ -20,35 +20,28 @@ Record = dict[str, Tensor]
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What does not change while B objects stand before their cameras: at most P parts each.
-
-    Attributes
-    ----------
-    fixed : dict
-        Rows, as :func:`artsim.observing.padding.pad_sample` names them: ``part_valid (B, P)`` and ``joint_type``,
-        ``joint_parent``, ``joint_axis``, ``joint_origin``, ``joint_rest``, ``joint_limits``, ``box_center``,
-        ``box_size``, and for each object ``scale``, ``diagonal``, ``T_world_object (B, 4, 4)``.
-    free : (B, P) bool
-        Joints whose state can be chosen.
-    low, high, far : (B, P) float
-        Range of each joint, half a turn either way where it turns freely, and its end that is farther from rest.
-    rotates, turns_freely : (B, P) bool
-    handle : (B, P, 3) float
-        Where to take hold of each part, rest frame, at rest; see :func:`artsim.envs.maniskill.goal.handle`.
-    mimic, mimic_offset : (B, P, P) and (B, P) float
-        ``q = mimic @ q + mimic_offset`` completes a state.
-    """
+    """What does not change while B objects stand before their cameras: at most P parts each."""
 
     fixed: Record
+    """Rows, as :func:`artsim.observing.padding.pad_sample` names them: ``part_valid (B, P)`` and ``joint_type``,
+    ``joint_parent``, ``joint_axis``, ``joint_origin``, ``joint_rest``, ``joint_limits``, ``box_center``, ``box_size``,
+    and for each object ``scale``, ``diagonal``, ``T_world_object (B, 4, 4)``."""
     free: Tensor
+    """(B, P) bool. Joints whose state can be chosen."""
     low: Tensor
     high: Tensor
     far: Tensor
+    """(B, P) float. Range of each joint, half a turn either way where it turns freely, and its end that is farther from
+    rest."""
     rotates: Tensor
     turns_freely: Tensor
+    """(B, P) bool."""
     handle: Tensor
+    """(B, P, 3) float. Where to take hold of each part, rest frame, at rest; see
+    :func:`artsim.envs.maniskill.goal.handle`."""
     mimic: Tensor
     mimic_offset: Tensor
+    """(B, P, P) and (B, P) float. ``q = mimic @ q + mimic_offset`` completes a state."""
 
     @property
     def rows(self) -> int:

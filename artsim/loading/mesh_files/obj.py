@@ -29,27 +29,18 @@ _HARMLESS_WORDS = frozenset(word[:8] for word in _HARMLESS)  # as Rows.words cut
 
 @dataclass(frozen=True)
 class Statements:
-    """What the text of a Wavefront file says of its surface.
-
-    Attributes
-    ----------
-    rows : Rows
-    points : (V, 3) float
-        NaN where no number can be read.
-    vertex_rows, face_rows : (R,) bool
-        Which rows declare a vertex or a face.
-    counts : (P,) int
-        Corners of each face.
-    references : bytes
-        The corners of all faces, such as ``1/2/3 4/5/6``, a face a row.
-    """
+    """What the text of a Wavefront file says of its surface."""
 
     rows: Rows
     points: Array
+    """(V, 3) float. NaN where no number can be read."""
     vertex_rows: np.ndarray
     face_rows: np.ndarray
+    """(R,) bool. Which rows declare a vertex or a face."""
     counts: Indices
+    """(P,) int. Corners of each face."""
     references: bytes
+    """The corners of all faces, such as ``1/2/3 4/5/6``, a face a row."""
 
     def indices(self, wanted: Indices, declared: np.ndarray) -> Indices:
         """(C,) number, from 0, of what each corner refers to; out of range where it refers to nothing.
@@ -136,25 +127,17 @@ def _surface(found: Statements, declared: int, bounds: Bounds) -> Surface:
 
 @dataclass(frozen=True)
 class Painted:
-    """What a Wavefront file says of its surface's looks.
-
-    Attributes
-    ----------
-    surface : Surface
-    libraries : list of str
-        Files that describe materials.
-    materials : list of str
-        Names; the first, empty, is of faces without one.
-    material_of_face : (F,) int
-    uv : (F, 3, 2) float
-        Place of each corner in the material's picture; NaN where the file gives none.
-    """
+    """What a Wavefront file says of its surface's looks."""
 
     surface: Surface
     libraries: list[str]
+    """Files that describe materials."""
     materials: list[str]
+    """Names; the first, empty, is of faces without one."""
     material_of_face: Indices
+    """(F,) int."""
     uv: Array
+    """(F, 3, 2) float. Place of each corner in the material's picture; NaN where the file gives none."""
 
 
 def read_painted(data: bytes, bounds: Bounds) -> Painted:

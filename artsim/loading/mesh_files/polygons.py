@@ -18,22 +18,16 @@ _WORK_OF_A_CALL = 2e4
 
 @dataclass
 class Triangulation:
-    """Triangles of many polygons.
-
-    Attributes
-    ----------
-    corners : (F, 3) int
-        Positions in the list of all polygons' corners, polygon after polygon.
-    too_few, unusable, crossing, too_many : int
-        Polygons with fewer than three corners; with corners that are no finite point; that cross themselves; that would
-        take too long.
-    """
+    """Triangles of many polygons."""
 
     corners: Indices
+    """(F, 3) int. Positions in the list of all polygons' corners, polygon after polygon."""
     too_few: int = 0
     unusable: int = 0
     crossing: int = 0
     too_many: int = 0
+    """Polygons with fewer than three corners; with corners that are no finite point; that cross themselves; that would
+    take too long."""
 
     def tell(self, draft: Draft) -> None:
         """Say what is missing."""

@@ -40,39 +40,27 @@ class UnusableMeshError(Exception):
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangles of one mesh file, in the file's frame, metres.
-
-    Attributes
-    ----------
-    vertices : (V, 3) float
-        Finite; each is a corner of some triangle.
-    faces : (F, 3) int32
-    notes : tuple of str
-        What was left out, assumed or mended.
-    corners : (F, 3) int, optional
-        Which corner of the file's polygons each triangle's corner is, where the reader keeps it.
-    """
+    """Triangles of one mesh file, in the file's frame, metres."""
 
     vertices: Array
+    """(V, 3) float. Finite; each is a corner of some triangle."""
     faces: NDArray[np.int32]
+    """(F, 3) int32."""
     notes: tuple[str, ...] = ()
+    """What was left out, assumed or mended."""
     corners: Indices | None = None
+    """(F, 3) int, optional. Which corner of the file's polygons each triangle's corner is, where the reader keeps
+    it."""
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """How large a mesh may be. Readers ask before they expand anything.
-
-    Attributes
-    ----------
-    where : Path
-        The file, for messages.
-    max_faces : int
-        Triangles, and vertices.
-    """
+    """How large a mesh may be. Readers ask before they expand anything."""
 
     where: Path
+    """The file, for messages."""
     max_faces: int
+    """Triangles, and vertices."""
 
     def check(self, count: int, what: str) -> None:
         """Refuse more than ``max_faces`` of something; raises AssetError."""
@@ -100,18 +88,12 @@ def _readable(count: int) -> str:
 
 @dataclass
 class Draft:
-    """A surface while its file is read.
-
-    Attributes
-    ----------
-    declared : int, optional
-        Faces that the file declares, counted without the code that reads them.
-    accounted : int
-        Faces that were read, or left out with a note.
-    """
+    """A surface while its file is read."""
 
     declared: int | None = None
+    """Faces that the file declares, counted without the code that reads them."""
     accounted: int = 0
+    """Faces that were read, or left out with a note."""
     notes: list[str] = field(default_factory=list)
     pieces: list[tuple[Array, Indices]] = field(default_factory=list)
     corners: Indices | None = None

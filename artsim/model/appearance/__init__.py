@@ -20,92 +20,61 @@ _CREASE = np.deg2rad(35.0)  # faces that meet at a smaller angle look like one s
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """What a surface is made of.
-
-    Attributes
-    ----------
-    colour : 3 float
-    roughness, metallic, specular : float
-        0 to 1, as in the metallic-roughness model.
-    texture : (H, W, 3) uint8 or None
-        Takes the place of the colour.
-    tile : float
-        Metres that the texture covers where a coat says nothing of how it lies.
-    emission : float
-        Share of the colour that it sends out by itself.
-    transmission : float
-        Share of the light that passes through. Depth sensors see less of such a surface; renderers draw it opaque.
-    substance : str
-        What it is made of, such as wood or metal; empty where that is not known.
-    """
+    """What a surface is made of."""
 
     colour: Colour
     roughness: float = 0.6
     metallic: float = 0.0
     specular: float = 0.5
+    """0 to 1, as in the metallic-roughness model."""
     texture: Image | None = None
+    """(H, W, 3) uint8 or None. Takes the place of the colour."""
     tile: float = 0.5
+    """Metres that the texture covers where a coat says nothing of how it lies."""
     emission: float = 0.0
+    """Share of the colour that it sends out by itself."""
     transmission: float = 0.0
+    """Share of the light that passes through. Depth sensors see less of such a surface; renderers draw it opaque."""
     substance: str = ""
+    """What it is made of, such as wood or metal; empty where that is not known."""
 
 
 @dataclass(frozen=True, eq=False)
 class Coat:
-    """How the triangles of a part look.
-
-    Attributes
-    ----------
-    materials : tuple of Material
-    material_of_face : (F,) int
-    uv : (F, 3, 2) float or None
-        Where each corner lies on the texture, upwards from its lower left corner, the whole texture being 1 wide and 1
-        high; NaN, or None for all, where the texture is wrapped around the part by ``Material.tile``.
-    """
+    """How the triangles of a part look."""
 
     materials: tuple[Material, ...]
     material_of_face: NDArray[np.int64]
+    """(F,) int."""
     uv: Array | None = None
+    """(F, 3, 2) float or None. Where each corner lies on the texture, upwards from its lower left corner, the whole
+    texture being 1 wide and 1 high; NaN, or None for all, where the texture is wrapped around the part by
+    ``Material.tile``."""
 
 
 @dataclass(frozen=True)
 class Sun:
-    """Distant light.
-
-    Attributes
-    ----------
-    direction : 3 float
-        In which it shines, world frame.
-    colour : 3 float
-        Light on a surface that faces it: 1 shows the surface's own colour.
-    radius : float
-        Angle in radians between the middle and the rim of the source: softens its shadows.
-    """
+    """Distant light."""
 
     direction: Colour
+    """In which it shines, world frame."""
     colour: Colour
+    """Light on a surface that faces it: 1 shows the surface's own colour."""
     radius: float = 0.0
+    """Angle in radians between the middle and the rim of the source: softens its shadows."""
 
 
 @dataclass(frozen=True)
 class Lights:
-    """All light in a scene.
-
-    Attributes
-    ----------
-    sun : Sun
-    sky : 3 float
-        Light from all sides above, which things keep from one another.
-    ambient : 3 float
-        Light that is everywhere.
-    background : 3 float
-        Colour where nothing stands.
-    """
+    """All light in a scene."""
 
     sun: Sun
     sky: Colour
+    """Light from all sides above, which things keep from one another."""
     ambient: Colour
+    """Light that is everywhere."""
     background: Colour = (0.8, 0.8, 0.8)
+    """Colour where nothing stands."""
 
 
 def plain_coat(part: Part, material: Material) -> Coat:
@@ -115,20 +84,13 @@ def plain_coat(part: Part, material: Material) -> Coat:
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Triangles of one material that share no corner, as rasterisers take them.
-
-    Attributes
-    ----------
-    vertices, normals : (3 F, 3) float32
-        Native units, rest frame.
-    uv : (3 F, 2) float32
-        From the texture's lower left corner.
-    material : Material
-    """
+    """Triangles of one material that share no corner, as rasterisers take them."""
 
     vertices: NDArray[np.float32]
     normals: NDArray[np.float32]
+    """(3 F, 3) float32. Native units, rest frame."""
     uv: NDArray[np.float32]
+    """(3 F, 2) float32. From the texture's lower left corner."""
     material: Material
 
     @property
