@@ -18,8 +18,6 @@ Rooms, from the ground up. Each imports only rooms that come before it (import-l
 - envs: reinforcement learning. commands: the verbs of the program.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 from artsim import errors

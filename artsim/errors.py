@@ -3,8 +3,6 @@
 Every message says *what* went wrong, *where*, and *how to fix it*.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

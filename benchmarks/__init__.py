@@ -1,7 +1,5 @@
 """Programs that print the figures of README and docs: ``python -m benchmarks.NAME --help``."""
 
-from __future__ import annotations
-
 import sys
 from types import TracebackType
 

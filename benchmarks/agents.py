@@ -10,8 +10,6 @@ runs of the parts' mean rotation error, in degrees, and how much less it is with
 pairs of runs; the last line is one JSON object.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass

@@ -6,8 +6,6 @@ last line is one JSON object with the fractions ``strict_urdf``, ``strict_kinema
 ``near_duplicates``, and objects per second of one core, without and with the gates that need no file.
 """
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import os

@@ -5,8 +5,6 @@ turns, one thread at a time: A B B A A B B A. Figures are ratios of processor ti
 things disturbs them little. It says whether both give the same bytes. The last line is one JSON object.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

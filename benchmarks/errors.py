@@ -8,8 +8,6 @@ rotation, with and without the objects that it is worst for, and how far its fac
 drawn as a picture. The last line is one JSON object.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from dataclasses import dataclass, replace

@@ -6,8 +6,6 @@ the end-to-end rate of two workers onto disk, and the memory of a worker with ev
 line is one JSON object.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import multiprocessing

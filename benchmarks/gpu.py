@@ -6,8 +6,6 @@ them; training and estimation. Each leaves its output and, where its last line i
 slice that has its file is not run again. The last line is one JSON object.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

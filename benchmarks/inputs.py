@@ -12,8 +12,6 @@ failures are counted by kind. The last line is one JSON object: ``{"files", "loa
 under ``"formats"`` the same of each format.
 """
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import os

@@ -5,8 +5,6 @@ moments, its orphans still busy as it begins again, and may finish. What it leav
 file less, none more. One line for each program; the last line is one JSON object.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -8,8 +8,6 @@ artsim: ``pip install open3d pyrender`` adds them. What is not installed is name
 package needs NumPy 1. Processor time; the last line is one JSON object.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import time

@@ -13,8 +13,6 @@ Every category with real objects is compared with those of a frozen split, by :m
 The last line is one JSON object.
 """
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import os

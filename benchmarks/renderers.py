@@ -5,8 +5,6 @@ ids per second at two image sizes, without the first frame of an object; its dep
 640x480; and every pixel on which they differ, under the reason for it. The last line is one JSON object.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import time

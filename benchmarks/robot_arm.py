@@ -5,8 +5,6 @@ The arm is a Franka Panda of seven parts and six joints, PyBullet's model of it,
 noise and masks that are not exact. A stopped run goes on. The last line is one JSON object.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import dataclass

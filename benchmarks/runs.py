@@ -6,8 +6,6 @@ files of all processes of a run are read, and how many shards there are. Printed
 that should not be. All ways must make the same bytes. The last line is one JSON object.
 """
 
-from __future__ import annotations
-
 import json
 import statistics
 import subprocess

@@ -10,8 +10,6 @@ it reads no limits.
 Kitchens of ten objects in a row (``artsim scene --place row --simulate``) are run by MuJoCo on one core.
 """
 
-from __future__ import annotations
-
 import json
 import tempfile
 import time

@@ -8,8 +8,6 @@ Printed are the largest overshoot of a limit over the joint's range, the largest
 artsim's own the states at the end are. The last line is one JSON object.
 """
 
-from __future__ import annotations
-
 import json
 import tempfile
 from collections import defaultdict

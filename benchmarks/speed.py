@@ -5,8 +5,6 @@ second of the fitting environment: a batch of objects takes random actions, rewa
 perception learns from, and states that the agent does. The last line is one JSON object.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import platform

@@ -14,8 +14,6 @@ retrieved object by true boxes, 1 for the best, and the share of points labelled
 object.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Sequence

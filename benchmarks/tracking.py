@@ -4,8 +4,6 @@ An unseen object turns, comes nearer and moves its joints, smoothly, before a ca
 thread. The last line is one JSON object.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterator

@@ -9,8 +9,6 @@ Last digits of the demo objects and of inertias depend on which kernels numpy an
 The program starts itself anew with those that every x86-64 processor with AVX2 and FMA has.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Sequence

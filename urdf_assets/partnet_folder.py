@@ -1,7 +1,5 @@
 """Objects written as PartNet-Mobility folders: Y-up meshes, an empty ``base`` link, joints without rotations."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field

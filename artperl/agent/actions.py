@@ -6,8 +6,6 @@ scales along them: seen from the reference, the same error needs the same action
 about its axis and moves its anchor; a slide moves along its axis. The axes that a joint does not have are masked.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import torch

@@ -4,8 +4,6 @@ Batched: B environments (objects, or several starts of one) step together. :mod:
 same code for gymnasium.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import torch

@@ -1,7 +1,5 @@
 """The nearest points of the same part, from an observed cloud to a posed reference and back."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

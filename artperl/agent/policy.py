@@ -6,8 +6,6 @@ whose own error its joint is not to make up for, and the whole object. Weights a
 for each type of joint, so that the number of parts is not built in.
 """
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor, nn
 from torch.nn import functional

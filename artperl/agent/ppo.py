@@ -4,8 +4,6 @@
 it. A :class:`Phase` says what the agent learns by, and how it acts meanwhile.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 from math import inf

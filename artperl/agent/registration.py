@@ -4,8 +4,6 @@ Each part of a reference is an object of its own, with a free joint and no other
 and moves; it does not scale.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import torch

@@ -1,7 +1,5 @@
 """Where an episode begins: the reference at the cloud's centroid, turned as objects are seen on average."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -3,8 +3,6 @@
 And where they lie at rest: how far a drawer's front stands before that of its reference is not how far it is open.
 """
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor, nn
 

@@ -1,7 +1,5 @@
 """Boxes of an estimate where a network says that they are, and its points labelled by these boxes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The verbs ``artperl artimage``, ``robustness`` and ``ablation``: the estimators of several categories are tested."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 from pathlib import Path

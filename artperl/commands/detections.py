@@ -1,7 +1,5 @@
 """The verb ``artperl detections``."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Estimators by the names that commands take: those of the package, and folders."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

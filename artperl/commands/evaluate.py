@@ -1,7 +1,5 @@
 """The verb ``artperl evaluate``, and what all tests of estimators share."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """The verb ``artperl report``."""
 
-from __future__ import annotations
-
 import os
 import sys
 from dataclasses import dataclass

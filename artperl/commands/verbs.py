@@ -1,7 +1,5 @@
 """The program ``artperl``: training, estimation, tests, benchmarks and reports."""
 
-from __future__ import annotations
-
 import sys
 from itertools import pairwise
 from typing import Annotated

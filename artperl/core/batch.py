@@ -1,7 +1,5 @@
 """Records of tensors that share their first dimension: one row per object, hypothesis or environment."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """How sure an estimate is, of the whole object and of each part, by what it says about itself."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, fields
 
 import numpy as np

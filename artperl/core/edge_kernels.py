@@ -1,7 +1,5 @@
 """Maxima over the neighbours of points, compiled, with their derivatives: faster than torch's ``embedding_bag``."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which part a point is of, given what is known of it before and how far each part is from it."""
 
-from __future__ import annotations
-
 from typing import Any, TypeVar
 
 import numpy as np

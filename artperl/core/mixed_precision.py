@@ -1,7 +1,5 @@
 """Networks that learn in half the bits, where that is faster."""
 
-from __future__ import annotations
-
 import torch
 
 

@@ -1,7 +1,5 @@
 """Neighbours in clouds: which points are nearest, and planes through them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

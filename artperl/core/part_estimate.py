@@ -1,7 +1,5 @@
 """An estimate of parts that were posed one by one: what joints say of them is worked out from their poses."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Families and files number drawers and doors in whatever order they were made in.
 guess that; where a part is can be seen.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What retrieval hands to the fit: objects of the base that may explain a cloud."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from torch import Tensor

@@ -1,7 +1,5 @@
 """Rotations in torch: matrices from axes, angles and vectors, and back."""
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor
 

@@ -1,7 +1,5 @@
 """Tensors on disk: whole files only, each with a digest of what it holds."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping

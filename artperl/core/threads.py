@@ -1,7 +1,5 @@
 """What an estimate takes of torch: one thread, and single precision, whatever the program around it has set."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

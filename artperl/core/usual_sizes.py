@@ -1,7 +1,5 @@
 """How large things of a category are, by which a wrong unit shows."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 USUAL = {

@@ -1,7 +1,5 @@
 """Training data: batches of partial clouds with what the perception network is to say about them."""
 
-from __future__ import annotations
-
 import signal
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence

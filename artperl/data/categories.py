@@ -5,8 +5,6 @@ ArtImage and ReArtMix, which the paper reports, have a fixed kinematic structure
 et al. 2022).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import count, islice
 from typing import Literal

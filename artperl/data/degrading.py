@@ -1,7 +1,5 @@
 """Clouds as detectors and cluttered scenes leave them: cut, with foreign points, or of few points."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -3,8 +3,6 @@
 A network that is told now this and now that of two views that look alike learns their mean, which is neither.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ whatever the points say. Stretching along an axis leaves a sample true where no 
 that axis, and slides do not run along it.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is true of clouds, as tensors: what networks learn to say."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From votes of pixels for the middles of their objects to objects."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix

@@ -4,8 +4,6 @@ Depth is divided by its median, so that a doll's house looks as a house does. Th
 a table mostly, is taken out of the inverse depth: what stands on it stays.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

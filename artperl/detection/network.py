@@ -4,8 +4,6 @@ A ResNet (He et al. 2016) below a UPerNet (Xiao et al. 2018), both of Hugging Fa
 weights. Middles in space tell objects of one category apart, as votes do in VoteNet (Qi et al. 2019).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from artsim.common.extras import require_extra

@@ -5,8 +5,6 @@ views of a category and source is worse by its margin and by more than twice the
 differences.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product

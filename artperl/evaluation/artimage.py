@@ -9,8 +9,6 @@ images; :mod:`artperl.evaluation.artimage_files` reads those. Rows:
 - ``procedural_sphere`` and ``real_sphere``: seen from all round.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -16,8 +16,6 @@ of PartNet-Mobility. The images themselves have not been seen here: tests read a
 from our own samples.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Files of the original ArtImage, one by one: joints of URDF files, lists, numbers and pictures."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

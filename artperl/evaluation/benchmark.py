@@ -1,7 +1,5 @@
 """Runs rows of the benchmark with the estimators of a folder, and sets the figures beside published ones."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any

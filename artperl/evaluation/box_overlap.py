@@ -1,7 +1,5 @@
 """Intersection of oriented boxes in 3D, exactly, and the sampled definitions of published code."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError

@@ -1,7 +1,5 @@
 """Confidence of an estimator, fitted to its scores on a validation set."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import fields
 from typing import Protocol, TypeVar

@@ -1,7 +1,5 @@
 """What a comparison of methods says of one method on the views of one category: means, intervals, and where it errs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any

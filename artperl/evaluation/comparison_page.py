@@ -1,7 +1,5 @@
 """A comparison of methods as Markdown."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

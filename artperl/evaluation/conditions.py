@@ -1,7 +1,5 @@
 """Conditions under which an estimator is tested: how objects stand, how they are seen, and what spoils the cloud."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

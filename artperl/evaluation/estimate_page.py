@@ -1,7 +1,5 @@
 """An estimate to look at: a page for any browser with the cloud by part, boxes and joint axes."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

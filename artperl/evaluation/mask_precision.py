@@ -1,7 +1,5 @@
 """Average precision of detections by their masks, as COCO has it, by pycocotools."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 from collections.abc import Iterator, Mapping, Sequence

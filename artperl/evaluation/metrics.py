@@ -6,8 +6,6 @@ centres those of the posed part boxes in the camera frame, sizes those of the pa
 A new metric is one function of an estimate and a sample, and one line of :data:`METRICS`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Parts as detections: which estimated parts are there, which true ones are found, and how far confidence tells."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

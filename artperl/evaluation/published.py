@@ -5,8 +5,6 @@ are as far as they are known. Rotations are in degrees, translations in units of
 overlaps are those of OMAD's evaluation. Figures that are measured here share no column with them: the images differ.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

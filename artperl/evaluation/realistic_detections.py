@@ -3,8 +3,6 @@
 Masks have wrong borders, lack pieces and leak; some objects are missed, some found twice, some are nothing at all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -3,8 +3,6 @@
 Images come from scenes that ``artsim scene`` wrote, or from folders in ReArtMix's own layout.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache

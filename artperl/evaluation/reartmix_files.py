@@ -11,8 +11,6 @@ The object's frame has the axes y, z, x of its URDF file, which is taken to stan
 Only the layout is known here, not the images: no figure of ours is on them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Whether confidence tells right estimates from wrong ones, and is right in as many cases as it says."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -4,8 +4,6 @@ Its cloud comes from the image as a user's does: depth with noise and missing re
 off, which may lack a piece or take in what is beside it. No ground truth is used but for the mask, which is made worse.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rows of the benchmark that show where an estimator stops being right, and whether its confidence says so."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Frozen test and validation samples: always the same ones for the same arguments."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

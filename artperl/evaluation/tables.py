@@ -1,7 +1,5 @@
 """Figures of an evaluation: their summary in JSON's terms, their table, and the published means beside them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """One object of a batch as NumPy arrays: what compiled loops work on. Shapes are as the batch has them, without B."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ next: the best few dozen mixes of states are followed from the root down, each j
 what counts is how far the points of all parts so far are from them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import torch

@@ -1,7 +1,5 @@
 """Where each parameter stands in a step of the refinement."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

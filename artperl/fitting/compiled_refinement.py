@@ -3,8 +3,6 @@
 Torch takes thousands of small operations for what these parts do in one call each.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Poses of parts that no point shows, by their parents, their joints and what is usual in the category."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation

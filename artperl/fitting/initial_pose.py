@@ -1,7 +1,5 @@
 """A first guess at every part's pose, from where the perception network says that points lie in the rest frame."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import torch

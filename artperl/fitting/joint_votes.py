@@ -1,7 +1,5 @@
 """Joints from the votes of the points near them (A-NCSH, Li et al. 2020, section 4.2)."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """The optimisation of OMAD (Xue et al. 2021, section 3.4): pose, states and shape that explain keypoints."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import torch

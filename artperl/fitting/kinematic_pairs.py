@@ -5,8 +5,6 @@ slide are turned alike. All joints of an object are optimised together, by Leven
 vector for each part.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

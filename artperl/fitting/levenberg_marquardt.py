@@ -6,8 +6,6 @@ kernel is that of Geman and McClure 1987, ``w^2 e^2 / (w^2 + e^2)``: it falls wh
 narrowing it on the way never raises the energy either.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 from torch import Tensor

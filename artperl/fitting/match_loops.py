@@ -3,8 +3,6 @@
 Distances that choose a disc, or a ray, are in single precision; everything else is in double precision.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

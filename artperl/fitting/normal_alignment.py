@@ -5,8 +5,6 @@ to make up for a reference whose top lies a little too high, or whose front a li
 face does not depend on where they lie, and tells the rotation to a few hundredths of a degree.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Options of the method "full"."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from artperl.fitting.refine_options import RefineOptions

@@ -1,7 +1,5 @@
 """What a fit says about each part."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor

@@ -1,7 +1,5 @@
 """How a reference is fitted by :func:`artperl.fitting.levenberg_marquardt.refine`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from artsim.errors import ConfigError

@@ -5,8 +5,6 @@ joints is fitted again until it gets no better. The second round turns the best 
 only with a better score.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import TypeVar
 

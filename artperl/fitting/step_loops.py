@@ -6,8 +6,6 @@ nine numbers change with all parameters. Only parameters that move take part. Co
 :class:`artperl.fitting.columns.Columns` has them.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

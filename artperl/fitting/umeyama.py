@@ -1,7 +1,5 @@
 """Similarities between paired points: in closed form (Umeyama 1991), and by RANSAC where some pairs are wrong."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

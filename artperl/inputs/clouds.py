@@ -1,7 +1,5 @@
 """Point clouds of files: which reader a file needs, and which of an array's numbers are coordinates."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

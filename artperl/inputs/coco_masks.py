@@ -1,7 +1,5 @@
 """Masks as COCO writes them: run lengths, compressed or not, and polygons."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Depth images of files, and the points that they show."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """Detections of files: COCO's results, with masks, scores and categories. Nothing wrong is left out silently."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

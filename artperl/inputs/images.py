@@ -1,7 +1,5 @@
 """Picture files, bounded by their number of pixels before they are decoded."""
 
-from __future__ import annotations
-
 import io
 import warnings
 from collections.abc import Mapping

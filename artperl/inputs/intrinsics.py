@@ -4,8 +4,6 @@ Where the centre of the first pixel is differs: at (0.5, 0.5) here and in NeRF's
 OpenCV, BOP, Open3D, RealSense and ROS. Half a pixel is 0.7 mm at 0.8 m. Matrices are always returned as used here.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -4,8 +4,6 @@ Names are compared without case, blanks, dots and underscores, so ``distCoeffs``
 own mapping says goes before what those around it say.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence

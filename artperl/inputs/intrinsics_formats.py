@@ -4,8 +4,6 @@ One table holds the formats, those first whose files nothing else looks like. A 
 ours.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Masks of files: which pixels of a depth image show the object."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from pathlib import Path

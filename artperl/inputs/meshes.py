@@ -1,7 +1,5 @@
 """Vertices of meshes as clouds: OBJ, STL, OFF, PLY. Faces, materials and other files are not looked at."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Points of PCD files (Point Cloud Library): ascii, binary and binary_compressed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

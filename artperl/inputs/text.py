@@ -1,7 +1,5 @@
 """Clouds of text: .xyz, .txt, .csv, .pts, .asc, with any separator, with or without a line of names."""
 
-from __future__ import annotations
-
 import io
 import re
 import warnings

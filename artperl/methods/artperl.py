@@ -5,8 +5,6 @@ reference's joint states, from the root to the leaves (4.3); a gradient optimise
 constraints (4.4). The 9D poses of the parts follow from the joint states (4.1).
 """
 
-from __future__ import annotations
-
 from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """Estimates of many clouds, in several processes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What a method is: it makes an estimate of a cloud."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 

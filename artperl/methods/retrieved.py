@@ -1,7 +1,5 @@
 """What methods share whose agent fits a retrieved reference: sizes, networks, settings."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 

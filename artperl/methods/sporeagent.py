@@ -4,8 +4,6 @@ A reference is retrieved as ArtPERL does it. Then an agent registers each of its
 that part, step by step, without kinematics; of all steps the one counts whose clouds are nearest.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 

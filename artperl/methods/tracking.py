@@ -6,8 +6,6 @@ are labelled by the nearest part. Where the fit gets much worse than it was, and
 anew: flat parts slide and turn a little from frame to frame, and nothing else brings them back.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 

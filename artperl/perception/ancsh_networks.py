@@ -1,7 +1,5 @@
 """The two networks of A-NCSH (Li et al. 2020): coordinates of points, and votes for joints."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import torch

@@ -3,8 +3,6 @@
 A fit has no scale of its own: a laptop of 180 m fits as well as one of 0.3 m. So the cloud is checked before.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

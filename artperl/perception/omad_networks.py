@@ -1,7 +1,5 @@
 """The two networks of OMAD (Xue et al. 2021): a prior of keypoints and joints, and what a cloud says of both."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import torch

@@ -4,8 +4,6 @@ A network that names parts by numbers has to count them, and one drawer too few 
 edge of a drawer is, and which way it slides, can be seen from each of its points.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """The paper's segmentation: PointNet++, and a three-layer MLP that names the part of each point (section 4.2)."""
 
-from __future__ import annotations
-
 from torch import Tensor, nn
 
 from artperl.core.pointnet2 import PointNet2

@@ -1,7 +1,5 @@
 """What references are searched by: the boxes of an object's parts, as perceived or as known."""
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor
 

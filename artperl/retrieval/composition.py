@@ -1,7 +1,5 @@
 """An object composed of parts of many: no base holds every mix of doors and drawers."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Names of the parts of an estimated object, from the objects that it is made of."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """References for what is perceived of one cloud: the nearest objects of the base, or one composed of their parts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import torch

@@ -1,7 +1,5 @@
 """From a cloud to a reference: the parts of its points, then the nearest object (ArtPERL, section 4.2)."""
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor
 

@@ -1,7 +1,5 @@
 """Files of shape bases: ``.npz`` without pickle, checked as they are read."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

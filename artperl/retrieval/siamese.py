@@ -4,8 +4,6 @@ Equation 1 as printed sums the features of all points over all parts, so that th
 features are pooled within each part, stand side by side, and two layers read them.
 """
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor, nn
 

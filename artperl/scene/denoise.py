@@ -1,7 +1,5 @@
 """Depth within a mask, without most of its noise: what a full image knows more of an object than a sparse cloud."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

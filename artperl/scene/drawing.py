@@ -1,7 +1,5 @@
 """Estimates drawn over their image: boxes of parts, joint axes, what each object is and how sure."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 

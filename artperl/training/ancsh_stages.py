@@ -1,7 +1,5 @@
 """Stages that A-NCSH learns in: coordinates of points, then votes for joints (Li et al. 2020, section 4.4)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import torch

@@ -3,8 +3,6 @@
 The network sees what it will see in use: references as they were found and fitted, faults included.
 """
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Callable
 from dataclasses import dataclass

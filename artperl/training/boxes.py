@@ -1,7 +1,5 @@
 """Stage: the network for boxes learns from the best estimator's own estimates."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

@@ -3,8 +3,6 @@
 Every step is written down when it is done, so that a stopped comparison goes on where it stopped.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Callable

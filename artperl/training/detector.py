@@ -4,8 +4,6 @@ The losses: cross-entropy of categories, and for cells of objects the distance o
 difference of logarithms of the size.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass

@@ -1,7 +1,5 @@
 """Scenes that the detector which comes with the package learns from."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from artsim.model.draws import StateOptions

@@ -1,7 +1,5 @@
 """Fitting problems to learn from: fresh objects seen by a camera, a reference for each, a start and the goal."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

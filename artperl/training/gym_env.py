@@ -5,8 +5,6 @@ One environment fits one object; what it does and what is seen are :class:`artpe
 One object at a time, Python's own work takes most of a step. A batch does it once for all.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

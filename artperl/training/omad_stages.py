@@ -1,7 +1,5 @@
 """Stages that OMAD learns in: the prior of keypoints and joints, then what clouds say (Xue et al. 2021)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar

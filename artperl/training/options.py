@@ -4,8 +4,6 @@ Everything that a run may be told stands here once, with its default and its che
 presets name fields of :class:`TrainOptions` and give them values by :func:`changed`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, is_dataclass, replace
 from typing import Any, TypeVar

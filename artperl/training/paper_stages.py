@@ -3,8 +3,6 @@
 Each goes on where it stopped: its batches, rates and actions are functions of the number of the step alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial

@@ -1,7 +1,5 @@
 """Losses of perception against the truth, and figures for people."""
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor, nn
 from torch.nn import functional

@@ -1,7 +1,5 @@
 """What a training run reports: curves as it goes, and in the end a page with its table and overlays of estimates."""
 
-from __future__ import annotations
-
 import base64
 import html
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ A run depends on its options alone. Batches, rollouts and learning rates are fun
 stopped run goes on exactly as if it had not been stopped: only the :class:`~artperl.training.state.RunState` is kept.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, cast
 

@@ -5,8 +5,6 @@ are written beside the old ones, then the JSON that names them, then they take t
 is killed, one of the two tensor files is the one that the JSON names.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Scenes as a detector learns from them: an image, and for each cell of 4 x 4 pixels what is true of it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

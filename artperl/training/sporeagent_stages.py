@@ -1,7 +1,5 @@
 """Stages that SporeAgent learns in: segmentation and retrieval as ArtPERL's, then the agent that registers parts."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import torch

@@ -3,8 +3,6 @@
 ``PPO("MultiInputPolicy", StableBaselinesEnvs(gymnasium.make_vec("artperl/PoseFitting-v0", 64)))`` learns from all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

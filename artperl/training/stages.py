@@ -1,7 +1,5 @@
 """What a run of each method learns: its networks, its stages in their order, and the estimator that they make."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """Steps of a network's learning: counted, saved, shown; and a stage of them on clouds and what is true, by any loss."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 

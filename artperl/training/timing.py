@@ -1,7 +1,5 @@
 """How long a run takes, from a few steps of each of its stages; and how many steps fill a time."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections import defaultdict

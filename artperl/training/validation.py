@@ -1,7 +1,5 @@
 """Validation of a run on a frozen set of unseen objects, its calibration, and its test."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -6,8 +6,6 @@ that it does reach. The required range goes beyond the real one by half of its w
 that differs from the known ones by half as much again is still one of the family's kind.
 """
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

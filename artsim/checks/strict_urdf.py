@@ -4,8 +4,6 @@ Both gates list problems; none means strict. Simulators forgive different omissi
 files that leave something out (PartNet-Mobility's do) behave differently in each.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path

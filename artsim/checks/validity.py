@@ -3,8 +3,6 @@
 Every gate fails closed: what cannot be checked has failed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -3,8 +3,6 @@
 Each backend is tried in a process of its own: some drivers crash the process that asks for a device in vain.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import signal

@@ -1,7 +1,5 @@
 """The verb ``artsim export``."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from dataclasses import dataclass, field

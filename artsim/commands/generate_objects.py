@@ -1,7 +1,5 @@
 """The verb ``artsim generate-objects``."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal

@@ -1,7 +1,5 @@
 """The command ``artsim grasps``."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Options of several verbs: which categories, what every object has, and how many processes do the work."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """The verbs ``artsim inspect`` and ``artsim families``: an object, or a category, in words."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What verbs print of long runs."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterator, Sequence
 

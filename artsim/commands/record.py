@@ -1,7 +1,5 @@
 """The verb ``artsim record``."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """The verbs ``artsim verify``, ``artsim repair`` and ``artsim merge``: datasets that are there."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """The verb ``artsim scene``."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path

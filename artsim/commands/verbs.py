@@ -1,7 +1,5 @@
 """The program ``artsim``: datasets, objects, variations, motions and scenes; checks, pictures, other formats."""
 
-from __future__ import annotations
-
 from artsim.commands.convert import Convert
 from artsim.commands.doctor import Doctor
 from artsim.commands.export import Export

@@ -1,7 +1,5 @@
 """The verbs ``artsim view`` and ``artsim gallery``: pictures."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

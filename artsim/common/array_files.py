@@ -1,7 +1,5 @@
 """Untrusted files of arrays, ``.npz`` and ``.npy``: never unpickled, and bounded before anything is expanded."""
 
-from __future__ import annotations
-
 import io
 import math
 import zipfile

@@ -7,8 +7,6 @@ Functions that call one another belong in one file: numba's cache notices change
 called, not of others.
 """
 
-from __future__ import annotations
-
 import contextlib
 import sys
 import threading

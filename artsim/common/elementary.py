@@ -9,8 +9,6 @@ Everything that ends in the bytes of an object or of a dataset uses these, and :
 BLAS.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any, overload

@@ -4,8 +4,6 @@ Every import of an optional dependency stands in :func:`require_extra`, or is re
 is :func:`import_failure`: nobody has to read a traceback to learn what to install.
 """
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import importlib

@@ -1,7 +1,5 @@
 """Values of untrusted JSON as types have them: plain types, records (dataclasses), and bounds in ``Annotated``."""
 
-from __future__ import annotations
-
 import math
 import re
 import types

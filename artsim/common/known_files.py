@@ -1,7 +1,5 @@
 """Files that a program has read, and what else may not be overwritten."""
 
-from __future__ import annotations
-
 import os
 import stat
 from pathlib import Path

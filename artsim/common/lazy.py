@@ -1,7 +1,5 @@
 """Packages whose public names are imported when first asked for: a program waits only for what it uses."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module

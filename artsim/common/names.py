@@ -1,7 +1,5 @@
 """Text out of files that nobody vouches for, made safe to print and to name files after."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import re

@@ -4,8 +4,6 @@
 :func:`artsim.common.files.write_atomic`.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import shutil

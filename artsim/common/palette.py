@@ -1,7 +1,5 @@
 """The colours of parts, in pictures and in files."""
 
-from __future__ import annotations
-
 import numpy as np
 
 # Okabe and Ito's colours, told apart with any colour vision; then lighter ones.

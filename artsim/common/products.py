@@ -5,8 +5,6 @@ every product is a sum of elementwise products in a fixed order, each step round
 :mod:`artsim.common.elementary`.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

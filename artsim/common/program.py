@@ -1,7 +1,5 @@
 """A program of several verbs: the command line is read as one of them, and errors are one line."""
 
-from __future__ import annotations
-
 import contextlib
 import inspect
 import io

@@ -1,7 +1,5 @@
 """Names and paths where a list of them is due."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from dataclasses import fields

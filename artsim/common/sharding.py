@@ -3,8 +3,6 @@
 Nothing here imports torch. A process that has not imported it is no worker of a loader and has no process group.
 """
 
-from __future__ import annotations
-
 import sys
 from typing import Any
 

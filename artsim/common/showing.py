@@ -1,7 +1,5 @@
 """Things that can be looked at: in a browser by :meth:`Showable.show`, in a notebook by themselves."""
 
-from __future__ import annotations
-
 import html
 from functools import singledispatch
 from importlib import import_module

@@ -3,8 +3,6 @@
 Names come out of files that nobody vouches for: they are shown escaped, and cut to the width of their column.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any

@@ -4,8 +4,6 @@ Both are untrusted. Each carries a digest of its own content, so that damage is 
 all that ``plan.json`` holds, so that the one is restored from the other.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """On-line training data: fresh procedural objects for ever, nothing on disk."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 

@@ -15,8 +15,6 @@ none of it. Until the dataset is merged, its folder ``parts`` holds::
     <i>-of-<n>.json          that a machine has done its share
 """
 
-from __future__ import annotations
-
 import json
 import re
 import time

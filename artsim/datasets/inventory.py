@@ -1,7 +1,5 @@
 """What of a dataset is there as it should be, and what else is there."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ much as dozens of samples of it, so on disk a few objects have several turns in 
 within laps of a fixed number of turns each: what a finished lap holds does not depend on the size of the dataset.
 """
 
-from __future__ import annotations
-
 _OBJECTS_AT_ONCE = 16
 """A worker keeps so many objects in memory, and every shard mixes so many."""
 

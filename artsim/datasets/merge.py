@@ -1,7 +1,5 @@
 """The end of a dataset: its objects have their names, and ``dataset.json`` is written."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Objects of a dataset in memory, the last ones used."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from typing import Any
 

@@ -3,8 +3,6 @@
 ``.sources.json`` holds paths, which are no part of the dataset: its bytes are the same wherever the sources lie.
 """
 
-from __future__ import annotations
-
 import json
 from collections import defaultdict
 from collections.abc import Sequence

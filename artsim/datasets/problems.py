@@ -1,7 +1,5 @@
 """What can be wrong with a dataset on disk, and what to do about it."""
 
-from __future__ import annotations
-
 import shlex
 from dataclasses import dataclass
 from pathlib import Path

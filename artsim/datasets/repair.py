@@ -1,7 +1,5 @@
 """Repairing a dataset: what is damaged or missing is made again, to the same bytes or not at all."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version

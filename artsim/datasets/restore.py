@@ -1,7 +1,5 @@
 """Making what a dataset lacks: objects from their sources, shards from the objects, descriptions from each other."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

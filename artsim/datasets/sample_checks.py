@@ -1,7 +1,5 @@
 """What must hold of a sample, checked against its object and against itself."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

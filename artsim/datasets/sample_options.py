@@ -1,7 +1,5 @@
 """What one sample looks like, and how it is drawn: its size, joint states and view, from (seed, index) alone."""
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 from collections.abc import Iterator

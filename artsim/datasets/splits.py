@@ -1,7 +1,5 @@
 """Which objects are trained on and which are tested with, what they are called, and in which order they are shown."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections import Counter, defaultdict

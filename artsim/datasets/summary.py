@@ -1,7 +1,5 @@
 """Datasets in words, on one screen: what one holds, and what was repaired on the way to it."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections import Counter, defaultdict

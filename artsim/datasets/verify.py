@@ -1,7 +1,5 @@
 """Checks of a dataset on disk: files, checksums and what must hold of every sample's ground truth."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from functools import partial

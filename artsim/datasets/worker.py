@@ -1,7 +1,5 @@
 """The tasks of a generation run: to load an object, to make a whole shard."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterator

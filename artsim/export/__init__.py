@@ -8,8 +8,6 @@ MuJoCo fuses a link that no joint moves into the world, unless its compiler has 
 say so themselves, in a ``<mujoco>`` element that other programs ignore, and the MJCF files do too.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict

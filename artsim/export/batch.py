@@ -4,8 +4,6 @@ Each object has a folder of its own, ``<category>/<seed>``, which is made under 
 whole. ``index.csv``, written last, lists all objects of the run.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import time

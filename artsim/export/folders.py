@@ -1,7 +1,5 @@
 """The folder of an object: made under another name, renamed once it is whole, and known by its ``meta.json``."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Loaded objects made ready to be exported: proper names, joints that are 0 at rest, and something that collides."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal, get_args
 

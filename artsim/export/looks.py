@@ -1,7 +1,5 @@
 """Finishes of an exported object: its surfaces by material, with normals and places on textures, and the materials."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

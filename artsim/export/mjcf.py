@@ -1,7 +1,5 @@
 """MJCF, in full precision (``MjSpec.to_xml`` keeps six digits), and compiled by ``mujoco.MjSpec`` before it counts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

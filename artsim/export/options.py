@@ -1,7 +1,5 @@
 """How an object stands and is driven in a simulator's file."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal, get_args
 

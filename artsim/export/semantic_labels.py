@@ -1,7 +1,5 @@
 """Semantic labels of USD files: what an object, its parts and its materials are, in words and as items of Wikidata."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

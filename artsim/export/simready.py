@@ -10,8 +10,6 @@ Below the object's folder, with the object's name::
 with everything but the picture.
 """
 
-from __future__ import annotations
-
 import io
 import os
 import tempfile

@@ -1,7 +1,5 @@
 """How numbers and meshes are written."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from artsim.model.robot import MeshShape

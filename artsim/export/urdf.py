@@ -1,7 +1,5 @@
 """URDF and the annotation of PartNet-Mobility folders."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """USD with UsdPhysics: rigid bodies, joints, masses and collision shapes, ready for Isaac Sim and its like."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a format is: which samples go into which file, and what is written for them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

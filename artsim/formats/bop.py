@@ -4,8 +4,6 @@ A scene is a folder of images that need not show the same objects. The frame of 
 object, so that poses of parts are comparable, and joint axes hold in every pose through the parent.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import accumulate

@@ -1,7 +1,5 @@
 """COCO: instance masks and boxes of parts, as run lengths, in one JSON file for each split."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path

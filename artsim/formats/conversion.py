@@ -3,8 +3,6 @@
 ``conversion.json`` is written last, with the checksum of every file; see :mod:`artsim.runs.tasks`.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """HDF5: one file for each sample, with the keys that BlenderProc's writer uses."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterable
 from pathlib import Path

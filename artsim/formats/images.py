@@ -1,7 +1,5 @@
 """Images as the bytes of PNG files, boxes of masks, and intrinsics for programs that count pixel centres from 0."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

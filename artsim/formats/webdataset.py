@@ -8,8 +8,6 @@ webdataset's own decoders of images make 8-bit colours of every PNG. :func:`deco
     webdataset.WebDataset(shards).decode(decode_values, "rgb8")
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from typing import Any
 

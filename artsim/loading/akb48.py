@@ -4,8 +4,6 @@ The URDF file is for Unity's importer of URDF files: frames, origins and axes ar
 Unity's exporter gives them. The coordinates (x, y, z) of a mesh are (y, z, x) of its link.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

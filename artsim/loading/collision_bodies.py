@@ -1,7 +1,5 @@
 """Bodies of loaded objects, where the file says what physics needs: convex collision geometry, and masses."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path

@@ -5,8 +5,6 @@ other is cut into convex ones by CoACD (Wei et al., Approximate Convex Decomposi
 Concavity and Tree Search, SIGGRAPH 2022). Results are kept in a folder, as that takes seconds for each piece.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import os

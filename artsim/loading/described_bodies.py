@@ -1,7 +1,5 @@
 """Bodies of parts whose file says what collides and what it weighs, as MJCF and USD do."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

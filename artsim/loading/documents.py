@@ -1,7 +1,5 @@
 """An object's file of any format as the links and joints of a URDF document."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TypeAlias

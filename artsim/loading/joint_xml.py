@@ -14,8 +14,6 @@ an axis of length 0                       fixed
 ========================================  =============================================================================
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from pathlib import Path
 

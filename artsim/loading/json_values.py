@@ -1,7 +1,5 @@
 """Values out of annotations in JSON, checked: what is wrong is an error that names the element."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

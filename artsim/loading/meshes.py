@@ -4,8 +4,6 @@ Mesh files are untrusted: they must lie inside the asset's folder or a declared 
 before they are read. Each is read once, however often the URDF names it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -4,8 +4,6 @@ A message is the length of a text, the text, which is JSON, and the bytes of its
 reads a hostile file may be taken over by it, and may send anything.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import struct

@@ -16,8 +16,6 @@ ball joints                               three hinges about x, y and z
 ========================================  =============================================================================
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping
 from pathlib import Path

@@ -14,8 +14,6 @@ a connect or weld constraint              left out: a closed chain is no tree, s
 Values of joints count from 0, where MuJoCo's equalities count from ``ref``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What an MJCF document includes, put in place: one tree of elements, without ``<include>``."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass, field
 from pathlib import Path

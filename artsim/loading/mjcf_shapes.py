@@ -4,8 +4,6 @@ A geom is seen where MuJoCo's viewers draw it: its group is 0, 1 or 2, and its c
 seen of it. Where shapes to be seen have groups of their own, a body that has some shows nothing else.
 """
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence

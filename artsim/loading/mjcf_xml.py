@@ -5,8 +5,6 @@ into very much is refused. MuJoCo opens no file: :class:`~artsim.loading.meshes.
 are handed over as vertices and triangles.
 """
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterator

@@ -19,8 +19,6 @@ several roots                             one part
 ========================================  =============================================================================
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path

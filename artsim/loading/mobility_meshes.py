@@ -13,8 +13,6 @@ They stand in one of these, whichever comes first:
 Version 2 has meshes of their own and looks at 2 first.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field

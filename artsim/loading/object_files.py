@@ -1,7 +1,5 @@
 """Which file is an object's: the one that was named, or one of a folder."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

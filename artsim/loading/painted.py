@@ -3,8 +3,6 @@
 Files are untrusted: a material file or picture must lie inside the asset's folder, and is bounded in size.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

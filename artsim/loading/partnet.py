@@ -7,8 +7,6 @@ Folders that :func:`artsim.export.export` wrote say more in ``meta.json``: the o
 help to build a screw. Such objects are at rest at their file's zero.
 """
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path

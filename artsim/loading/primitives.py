@@ -4,8 +4,6 @@ The same bits on every processor, as :mod:`artsim.common.elementary` says; trime
 library.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import pairwise
 

@@ -4,8 +4,6 @@ PartNet-Mobility's objects stand upright with their front to -X once loaded, and
 scissors do not: their zero is 34 degrees open and symmetric about Y, so that closed blades lean by 17 degrees.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

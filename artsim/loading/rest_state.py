@@ -8,8 +8,6 @@ instance, known or not. In PartNet-Mobility doors, drawers and lids of appliance
 eyeglasses open.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Options of programs that load objects: where files lie, ``--package-root NAME=FOLDER``, and which object is meant."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -4,8 +4,6 @@ What hangs on the world, through joints or none, is one object, and so is each f
 several, the only one that is articulated counts, or, where none is, the only free one. Else somebody has to choose.
 """
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

@@ -5,8 +5,6 @@ its axis, and ``children``, all in the frame of the meshes, with Z up. The mesh 
 ``part_objs/none_motion.obj``, that of another node ``part_objs/<dof_name>.obj``. No node says how far it moves.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

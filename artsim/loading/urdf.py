@@ -4,8 +4,6 @@ Separate steps: the document is checked and parsed (``documents``), links are me
 their meshes are read (``meshes``), and here joints are rewritten in the rest frame, and the rest state is chosen.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path

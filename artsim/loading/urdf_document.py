@@ -3,8 +3,6 @@
 Other formats are written as the same links and joints.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias

@@ -4,8 +4,6 @@ The file is untrusted: no document type, no entities, bounded size, every number
 and recorded; what cannot raises an error that names the element.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection, Sequence
 from pathlib import Path

@@ -21,8 +21,6 @@ distance joints, loops                    an error
 The zero of a joint is where its two frames meet, wherever the bodies stand in the stage.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Rigid bodies of a stage and their shapes, in metres and Z up; and which of its static shapes are not the object's."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -3,8 +3,6 @@
 What a body's MassAPI leaves unsaid follows from its collision geometry.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

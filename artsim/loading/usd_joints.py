@@ -1,7 +1,5 @@
 """Joints of a stage: where they are, and the axes that they leave free, one after another."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Opens an untrusted USD file: every layer that it is made of lies in its folder, and all are of a size."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

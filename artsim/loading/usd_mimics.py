@@ -11,8 +11,6 @@ Schema                   multiplier, offset of the leader's value      units
 =======================  ============================================  ======================================
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

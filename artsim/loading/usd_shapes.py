@@ -1,7 +1,5 @@
 """Surfaces of USD prims: meshes, cubes, spheres, cylinders, capsules and cones."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

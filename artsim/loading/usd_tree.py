@@ -1,7 +1,5 @@
 """Bodies and joints of a stage as links from the root outwards, at the zero of all joints."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Values of USD attributes, of the type that their schema gives them: a file may write any."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

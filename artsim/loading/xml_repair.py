@@ -5,8 +5,6 @@ prefixes that nothing declares, with attributes that touch each other. Such file
 parsed, and every mend is recorded.
 """
 
-from __future__ import annotations
-
 import codecs
 import re
 import shlex

@@ -1,7 +1,5 @@
 """Values of URDF elements, as attributes or in the ways that other formats write them, checked and with repairs."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
 from pathlib import Path

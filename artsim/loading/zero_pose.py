@@ -5,8 +5,6 @@ where bodies and joints stand in the world when every joint is 0. From that alon
 link's frame has the axes of the world, and its origin at the anchor of its joint.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The pose distribution: joint states, viewpoints and object scale, each drawn from an explicit generator."""
 
-from __future__ import annotations
-
 import fnmatch
 import importlib
 from collections.abc import Callable, Mapping

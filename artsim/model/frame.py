@@ -1,7 +1,5 @@
 """What a camera sees of one object."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Joints of a kinematic tree, and their records in files."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

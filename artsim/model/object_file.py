@@ -1,7 +1,5 @@
 """Objects compiled into one compact file each, and a bounded cache of them."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Mapping, Sequence

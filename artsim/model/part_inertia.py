@@ -1,7 +1,5 @@
 """What a part weighs, and how it resists being turned."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.errors import AssetError

@@ -1,7 +1,5 @@
 """PLY: clouds coloured by part, and meshes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

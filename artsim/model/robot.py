@@ -1,7 +1,5 @@
 """An object as links and joints of the kinds that simulators know: what every file format is written from."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace

@@ -5,8 +5,6 @@ across it. Then each pose of the stretched object is the stretched pose of the o
 not collide.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

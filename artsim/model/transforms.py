@@ -1,7 +1,5 @@
 """Matrices of rigid transforms, and what they do to points."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -1,7 +1,5 @@
 """What is drawn into every picture: a colour for each part, boxes, joint axes, and surfaces shaded by part."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Look at a posed object: its cloud with the ground truth, as rendered, cast and read by a sensor."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -5,8 +5,6 @@ pixels of the table, a wall or a neighbour. :func:`interfere` makes such a cloud
 measured along a ray of the same camera: foreign points lie on rays that pass beside the object.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ A step sees the scene around each pixel through a :data:`Look`, so that it works
 rays alike; what chance decides at a pixel depends on a key and the pixel alone, so that both give the same readings.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache

@@ -1,7 +1,5 @@
 """Samples as dictionaries of equally shaped arrays, which default collation of training loops stacks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, Protocol
 

@@ -1,7 +1,5 @@
 """A small picture of an object, each part in a colour of its own, from the front left and above."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image

@@ -4,8 +4,6 @@ The search tries the axes of the rest frame and that of the part's own joint, th
 part that lies askew and turns about something else does not count as round.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation

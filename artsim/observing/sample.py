@@ -1,7 +1,5 @@
 """The Sample record: one camera view of one posed object, with everything that is true of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path

@@ -4,8 +4,6 @@ A sensor is a tuple of small steps, applied in order (see :mod:`artsim.observing
 ray: noise changes the depth that is reported there, and may take the return away.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ estimate that mixes them up is as good as any. The search tries the rotations of
 surfaces; so it finds half and quarter turns about the axes of the rest frame, and no others.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 

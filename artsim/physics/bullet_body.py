@@ -1,7 +1,5 @@
 """Accelerations by PyBullet: the object as a multibody whose base stands still, in a world of its own."""
 
-from __future__ import annotations
-
 import tempfile
 import weakref
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Episodes: an object of some source under physics, before a camera that stands or goes round it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path

@@ -5,8 +5,6 @@ number of the frame) and its object ``objects/motion-000000.npz``. What is the s
 parts keep their number, and points of equal ``part`` and ``npcs`` are the same place of the object, wherever it moved.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace

@@ -1,7 +1,5 @@
 """Joints under Coulomb friction and motors of limited strength: the speeds at the end of a time step, exactly."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.model.kinematics import Array

@@ -5,8 +5,6 @@ Each object has ``NAME.json`` and ``NAME.npz``, of its category and id. The arra
 same by part.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import zlib

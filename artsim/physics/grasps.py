@@ -9,8 +9,6 @@ with the hand turned about the line between them. The hand comes along its Z axi
 then closes, follows the way that the part takes as its joint opens, and must have taken the part with it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

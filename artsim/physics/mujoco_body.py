@@ -1,7 +1,5 @@
 """Accelerations by MuJoCo: the object's links and joints as bodies whose base stands still."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How objects move: what computes it, its step, and factors on what joints lose."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -13,8 +13,6 @@ Simulators that keep joints which follow others together (``mimic``) do so by fo
 must name every joint, and here it does.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Whether files are as they were written."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor

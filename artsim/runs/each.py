@@ -1,7 +1,5 @@
 """The same function for many tasks, in several processes or on a cluster, with results in order."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Iterable, Iterator
 from typing import Any, TypeVar
 

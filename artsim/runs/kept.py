@@ -1,7 +1,5 @@
 """Figures of a long measurement in one JSON file, written as they come: a stopped measurement resumes from it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

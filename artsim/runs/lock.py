@@ -1,7 +1,5 @@
 """The one writer of a folder or of a file; a lock goes with the process, however it ends."""
 
-from __future__ import annotations
-
 import contextlib
 import sys
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """What a run was asked for: options that make sense, and how they differ from those it was begun with."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

@@ -4,8 +4,6 @@ Names in a storage are relative and have ``/`` between their parts. A file is ab
 locks, no links and cannot append: nothing here asks for them.
 """
 
-from __future__ import annotations
-
 import io
 import os
 import random

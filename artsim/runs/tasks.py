@@ -4,8 +4,6 @@ A folder under construction holds ``progress.jsonl``: a line that says what is m
 A last file, written at the end, holds the checksum of every file: its presence means that all is there.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """A process that does the tasks of a run: what it keeps between them, and what it says to its parent."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -3,8 +3,6 @@
 Each scene is a piece of work; see :mod:`artsim.runs.tasks`.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from itertools import accumulate
 from pathlib import Path

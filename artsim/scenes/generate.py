@@ -1,7 +1,5 @@
 """Scenes on disk: drawn, seen and written by worker processes, resumably; see :mod:`artsim.runs.tasks`."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field

@@ -1,7 +1,5 @@
 """Ground truth of a scene: for each articulated object that a camera sees, the same record as for one alone."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What depth cameras miss of a scene: shiny and transparent surfaces, in patches."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

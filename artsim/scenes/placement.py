@@ -1,7 +1,5 @@
 """Putting things down: at rest on a level surface, none overlapping another."""
 
-from __future__ import annotations
-
 import weakref
 from dataclasses import dataclass, field
 from types import ModuleType

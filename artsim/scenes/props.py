@@ -1,7 +1,5 @@
 """What stands in scenes besides articulated objects: tables, floors, walls, and everyday things of no interest."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Drawing scenes: which objects, where they stand, how they look, from where they are seen. Same seed, same scene."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Things let fall onto a support and onto each other: they come to rest as MuJoCo's physics has it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -6,8 +6,6 @@ files at rest, and ``scene.json``: for each object its URDF file, ``T_world_obje
 would meet another object somewhere in their range. The support is the plane z = 0. Distractors are left out.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

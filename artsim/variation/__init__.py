@@ -3,8 +3,6 @@
 Each passes the gates that the object itself passes. :mod:`artsim.variation.folder` writes many of them as files.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from artsim.model.objects import ArticulatedObject

@@ -4,8 +4,6 @@ Each variation has a folder of its own, named by its seed, which is made under a
 whole. Its ``meta.json`` says from what and how it was varied.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Maps of whole objects: surfaces, collision pieces and joints go together."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from dataclasses import replace
 from itertools import pairwise

@@ -4,8 +4,6 @@ An operation is a function of an object, a generator, a strength between 0 and 1
 returns the new object and a record of names and numbers that JSON can hold, or None where it finds nothing to do.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The search for a variation that passes the gates that its original passes: drawn again, ever more gently."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from collections.abc import Sequence

@@ -8,8 +8,6 @@ sub-scenes at once; on a CPU each process simulates one:
     python examples/maniskill/main.py out/maniskill --help     # other objects, goals and robots
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 from functools import partial

@@ -4,8 +4,6 @@ A ray ``d`` meets the plane of a triangle with corners ``a, b, c`` where ``w = [
 coordinates. The pixel lies in the triangle when no weight is negative, at the depth ``1 / sum(w)``.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -4,8 +4,6 @@ Files are untrusted. Readers count what a file declares before they expand it, o
 buffers, and say whatever does not arrive.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

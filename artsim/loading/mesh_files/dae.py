@@ -5,8 +5,6 @@ Materials, images and texture coordinates are never looked at: what is missing o
 ``<unit>`` is applied and ``<up_axis>`` is not: so do RViz, PyBullet and SAPIEN when a URDF file names a mesh.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 

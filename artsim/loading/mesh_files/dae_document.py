@@ -1,7 +1,5 @@
 """The XML of a COLLADA file, and the numbers and references in it."""
 
-from __future__ import annotations
-
 import numpy as np
 from lxml import etree
 

@@ -1,7 +1,5 @@
 """The triangles of one ``<geometry>`` of a COLLADA file."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

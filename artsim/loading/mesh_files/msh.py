@@ -1,7 +1,5 @@
 """MSH: MuJoCo's old format of meshes, in bytes. Four counts, then vertices, normals, texture coordinates, triangles."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from artsim.loading.mesh_files.surface import Bounds, Draft, Surface, UnusableMeshError

@@ -1,7 +1,5 @@
 """Wavefront OBJ: vertices and polygons in text. No other file is opened, whatever the text names."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """PLY: a header that says what follows, then rows of numbers in text or in bytes."""
 
-from __future__ import annotations
-
 import re
 import struct
 from collections.abc import Callable

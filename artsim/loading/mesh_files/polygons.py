@@ -1,7 +1,5 @@
 """Polygons become triangles: convex ones by a fan, others by ear clipping."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

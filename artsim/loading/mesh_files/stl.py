@@ -1,7 +1,5 @@
 """STL: triangles, in bytes or in text."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

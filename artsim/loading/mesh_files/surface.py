@@ -1,7 +1,5 @@
 """What every reader of mesh files shares: the surface it makes, the bounds it keeps, and what it says."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path

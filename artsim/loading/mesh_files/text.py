@@ -1,7 +1,5 @@
 """Rows of numbers in text files of millions of rows, read by NumPy instead of row by row."""
 
-from __future__ import annotations
-
 import codecs
 import re
 import warnings
