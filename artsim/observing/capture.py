@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.common.elementary import log
+from artsim.common.products import matmul
 from artsim.common.sequences import listed
 from artsim.errors import ConfigError, RenderError
 from artsim.model.camera import Camera
@@ -149,7 +150,7 @@ def frame_of(sample: Sample, obj: ArticulatedObject) -> Frame:
     if sample.depth is not None and sample.part_mask is not None:
         return Frame(sample.depth, sample.part_mask, rgb=sample.rgb)
     camera = Camera(sample.K, sample.width, sample.height, sample.T_world_camera)
-    return render(obj, sample.joint_state, camera, sample.T_world_camera @ sample.T_camera_part[0])
+    return render(obj, sample.joint_state, camera, matmul(sample.T_world_camera, sample.T_camera_part[0]))
 
 
 def _lookup(frame: Frame) -> Look:
