@@ -11,6 +11,7 @@ Kitchens of ten objects in a row (``artsim scene --place row --simulate``) are r
 """
 
 import json
+import logging
 import tempfile
 import time
 from collections import Counter, defaultdict
@@ -142,7 +143,10 @@ def in_kitchens(count: int) -> list[dict[str, float]]:
 def main() -> None:
     """Entry point of ``python -m benchmarks.simready``."""
     import simready.validate as validator
+    import warp
 
+    logging.getLogger().setLevel(logging.ERROR)  # the validator warns of its own code
+    warp.config.quiet = True
     options = tyro.cli(Options)
     validator.initialize(rules_and_requirements_paths=[], features_paths=[], profiles_paths=[])
     keys = [(category, options.first_seed + n) for category in sorted(FAMILIES) for n in range(options.objects)]

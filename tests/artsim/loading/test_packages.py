@@ -249,7 +249,7 @@ def test_every_command_that_loads_objects_takes_package_roots() -> None:
     assert tyro.cli(Train, args=roots).package_roots == expected
     assert tyro.cli(Evaluate, args=["laptop", *roots]).package_root == expected
     assert tyro.cli(Record, args=["--out", "o", *roots]).episode.package_root == expected
-    assert tyro.cli(Scene, args=["--out", "o", *roots]).scene.package_root == expected
+    assert tyro.cli(Scene, args=["--out", "o", *roots]).options.scene.package_root == expected
 
 
 @pytest.mark.parametrize(
