@@ -6,19 +6,22 @@ from pathlib import Path
 
 import tyro
 
+from artsim.commands.having import Workers, categories_named
 from artsim.common.progress import say
 from artsim.errors import AssetError, ConfigError
+from artsim.loading.roots import Packages
 
 
 @dataclass(frozen=True)
-class Grasps:
+class Grasps(Packages, Workers):
     """Find grasps of movable parts that open their joints, each proved in MuJoCo by a hand with two fingers.
 
     For every part there are up to 16 places where the fingers close on opposite sides of a handle or an edge. The hand
     comes without touching anything, closes with 70 N, and takes the part along the way that its joint goes.
 
     Example: artsim grasps path/to/StorageFurniture/45162 --out out/grasps
-    Example: artsim grasps --category drawer refrigerator --count 20 --out out/grasps
+
+    Procedural ones: artsim grasps --category drawer refrigerator --count 20 --out out/grasps
     """
 
     objects: tyro.conf.Positional[tuple[Path, ...]] = ()
@@ -33,20 +36,17 @@ class Grasps:
     """Seed of the first object of a category, and of the draws."""
     per_part: int = 16
     """Grasps of a part, at most."""
-    workers: int = 2
-    """Processes. The result does not depend on it."""
     json: bool = False
     """Print the figures as JSON, too, on the last line."""
 
     def run(self) -> None:
-        from artsim.families import FAMILIES
         from artsim.loading.sources import Source, family_sources, find_sources
         from artsim.physics.grasp_files import write_grasps
 
         if not (self.objects or self.category):
             raise ConfigError("there are no objects", fix="name files, or --category drawer")
-        categories = sorted(FAMILIES) if self.category == ("all",) else list(self.category)
-        sources: list[Source] = [*find_sources(self.objects)] if self.objects else []
+        categories = categories_named(self.category)
+        sources: list[Source] = [*find_sources(self.objects, self.package_root)] if self.objects else []
         if categories:
             sources += family_sources(categories, self.count, self.seed)
         done = write_grasps(sources, self.out, self.per_part, self.seed, self.workers)

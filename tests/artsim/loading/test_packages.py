@@ -239,11 +239,12 @@ def test_every_command_that_loads_objects_takes_package_roots() -> None:
     import tyro
 
     from artperl.commands.verbs import Evaluate, Train
-    from artsim.commands.verbs import Generate, Inspect, Record, Scene, View
+    from artsim.commands.verbs import Generate, Grasps, Inspect, Record, Scene, View
 
     roots = ["--package-root", "a=/x", "b=/y"]
     expected = {"a": Path("/x"), "b": Path("/y")}
     assert tyro.cli(Generate, args=["--out", "o", *roots]).package_root == expected
+    assert tyro.cli(Grasps, args=["o", *roots]).package_root == expected
     assert tyro.cli(Inspect, args=["o", *roots]).package_root == expected
     assert tyro.cli(View, args=["o", *roots]).package_root == expected
     assert tyro.cli(Train, args=roots).package_roots == expected
