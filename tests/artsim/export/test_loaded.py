@@ -13,6 +13,7 @@ import artsim
 from artsim.commands.export import Export
 from artsim.errors import ArtsimError, AssetError
 from artsim.export import FORMATS, export, prepare
+from artsim.export.options import ExportOptions
 from artsim.model.convex_bodies import is_convex
 from artsim.model.objects import ArticulatedObject
 from tests.conftest import ASSETS, installed
@@ -68,7 +69,10 @@ def test_pieces_leave_a_drawer_open_in_mujoco(
 
 
 def test_the_program_writes_a_folder_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    Export(ASSETS / "laptop", tmp_path / "out", formats=("mjcf",), collision="hull").run()
+    Export(
+        ASSETS / "laptop", tmp_path / "out", formats=("mjcf",), collision="hull", options=ExportOptions(materials=True)
+    ).run()
+    assert (tmp_path / "out" / "meshes" / "materials.mtl").is_file()
     assert "2 parts, 2 shapes that collide" in capsys.readouterr().out
     assert artsim.load(tmp_path / "out").category == "laptop"
     with pytest.raises(ArtsimError, match="exists already"):
