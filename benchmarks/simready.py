@@ -142,12 +142,12 @@ def in_kitchens(count: int) -> list[dict[str, float]]:
 
 def main() -> None:
     """Entry point of ``python -m benchmarks.simready``."""
+    options = tyro.cli(Options)
     import simready.validate as validator
     import warp
 
     logging.getLogger().setLevel(logging.ERROR)  # the validator warns of its own code
     warp.config.quiet = True
-    options = tyro.cli(Options)
     validator.initialize(rules_and_requirements_paths=[], features_paths=[], profiles_paths=[])
     keys = [(category, options.first_seed + n) for category in sorted(FAMILIES) for n in range(options.objects)]
     failed: Counter[str] = Counter()

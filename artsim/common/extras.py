@@ -50,6 +50,8 @@ MODULES = {
     "stable_baselines3": ("stable-baselines3", "dev"),
     "webdataset": ("webdataset", "dev"),
     "playwright": ("playwright", "dev"),
+    "simready": ("simready-validate", "dev"),
+    "newton": ("Newton", "dev"),
 }
 """Optional modules: what each is called, and the extra that brings it."""
 

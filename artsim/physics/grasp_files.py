@@ -106,6 +106,8 @@ def _write(task: tuple[Source, Path, int, int]) -> tuple[dict[str, Any] | None, 
             obj = prepare(obj, progress=False)
         gripper = Gripper()
         grasps = find_grasps(obj, np.random.default_rng([seed, zlib.crc32(name.encode())]), count, gripper)
+    except ConfigError:  # concerns the run, not this object
+        raise
     except ArtsimError as error:
         return None, str(error), True
     record = {**asked, **grasp_record(obj, grasps, gripper), "sha256": asked["sha256"]}

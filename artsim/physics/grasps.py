@@ -164,7 +164,7 @@ class _Trial:
     """An object and a hand in MuJoCo."""
 
     def __init__(self, obj: ArticulatedObject, gripper: Gripper):
-        self.mujoco = mujoco = import_mujoco("proofs of grasps")
+        self.mujoco = mujoco = import_mujoco("grasps")
         self.obj, self.gripper = obj, gripper
         robot = as_robot(obj)
         files = {f"{mesh.name}.obj": obj_text(mesh).encode() for mesh in robot.meshes}

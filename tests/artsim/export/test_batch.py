@@ -32,7 +32,7 @@ def test_bytes_depend_on_the_seed_alone_and_whole_objects_are_kept(
     formats = [name for name in FORMATS if name != "usd"]
     one = generate_objects(["laptop", "drawer"], tmp_path / "one", 2, 5, formats, workers=1, progress=False)
     two = generate_objects(["laptop", "drawer"], tmp_path / "two", 2, 5, formats, workers=2, progress=False)
-    assert (one.objects, one.made) == (two.objects, two.made) == (4, 4)
+    assert (one.total, one.made) == (two.total, two.made) == (4, 4)
     assert content(tmp_path / "one") == content(tmp_path / "two")
 
     # One object lost, one half made, one of another version: only these are made.
