@@ -1,4 +1,4 @@
-"""The program ``artsim``: datasets, objects, variations, motions and scenes; checks, pictures, other formats."""
+"""The program ``artsim``: datasets, objects, grasps, variations, motions, scenes; checks, pictures, formats."""
 
 from artsim.commands.convert import Convert
 from artsim.commands.doctor import Doctor

@@ -66,6 +66,7 @@ def usd_stage(
         UsdGeom.Scope.Define(stage, scope)
     for joint in robot.joints:
         _add_joint(stage, scope.AppendChild(joint.name), joint, robot, paths)
+    slides = {joint.name: joint.type == "prismatic" for joint in robot.joints}
     for joint in robot.joints:
         if joint.mimic is not None:
             source, multiplier, offset = joint.mimic
@@ -73,9 +74,8 @@ def usd_stage(
             prim.CreateRelationship("artsim:mimic:joint").SetTargets([scope.AppendChild(source)])
             prim.CreateAttribute("artsim:mimic:multiplier", Sdf.ValueTypeNames.Double).Set(multiplier)
             prim.CreateAttribute("artsim:mimic:offset", Sdf.ValueTypeNames.Double).Set(offset)
-            kinds = {named.name: named.type == "prismatic" for named in robot.joints}
-            if kinds[source] == kinds[joint.name]:
-                _add_mimic(prim, scope.AppendChild(source), kinds[source], multiplier, offset)
+            if slides[source] == slides[joint.name]:
+                _add_mimic(prim, scope.AppendChild(source), slides[source], multiplier, offset)
     if labelled:
         add_labels(stage, robot, paths, materials)
     return stage

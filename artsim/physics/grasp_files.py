@@ -10,7 +10,7 @@ import json
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +74,7 @@ def write_grasps(
     records, failed, made = list[dict[str, Any]](), list[str](), 0
     with folder_lock(out):
         tasks = [(source, out, count, seed) for source in sources]
-        results = each(partial(_worker), tasks, workers)
+        results = each(_worker, tasks, workers)
         for record, error, new in track("grasps", results, total=len(tasks), unit="object", shown=progress):
             made += new
             failed += [error] if error else []
@@ -96,7 +96,8 @@ def _write(task: tuple[Source, Path, int, int]) -> tuple[dict[str, Any] | None, 
     source, out, count, seed = task
     try:
         obj = source.load()
-        name, asked = safe_name(f"{obj.category}_{obj.object_id}"), {"count": count, "seed": seed, "sha256": obj.sha256}
+        name = safe_name(f"{obj.category}_{obj.object_id}")
+        asked = {"artsim_version": version("artsim"), "count": count, "seed": seed, "sha256": obj.sha256}
         path = out / f"{name}.json"
         if path.is_file():
             found = read_json(path, "a file of grasps", ConfigError, _MAX_BYTES)
@@ -110,7 +111,7 @@ def _write(task: tuple[Source, Path, int, int]) -> tuple[dict[str, Any] | None, 
         raise
     except ArtsimError as error:
         return None, str(error), True
-    record = {**asked, **grasp_record(obj, grasps, gripper), "sha256": asked["sha256"]}
+    record = {**asked, **grasp_record(obj, grasps, gripper)}
     arrays = io.BytesIO()
     np.savez(
         arrays, T_part_grasp=grasps.T_part_grasp, part=grasps.part, width=grasps.width, opened=grasps.opened

@@ -10,7 +10,7 @@ then closes, follows the way that the part takes as its joint opens, and must ha
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from artsim.model.joints import ROTATING
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
 from artsim.model.robot import as_robot
+from artsim.model.transforms import compose_transform
 
 FRICTION_ANGLE = np.deg2rad(20.0)
 """Half the opening of the cone of friction in which pads hold: steel or rubber on wood and plastic holds more."""
@@ -153,10 +154,8 @@ def _candidates(
         side /= np.linalg.norm(side)
         for angle in 2.0 * np.pi * (np.arange(_ANGLES) + rng.random()) / _ANGLES:
             towards = np.cos(angle) * side + np.sin(angle) * np.cross(across, side)
-            T = np.eye(4)
-            T[:3, :3] = np.column_stack([np.cross(across, towards), across, towards])
-            T[:3, 3] = middle
-            found.append((T, float(width[row])))
+            rotation = np.column_stack([np.cross(across, towards), across, towards])
+            found.append((compose_transform(middle, rotation), float(width[row])))
     return [found[row] for row in rng.permutation(len(found))]
 
 
@@ -221,10 +220,8 @@ class _Trial:
             data.ctrl[:] = self.gripper.force
             self.mujoco.mj_step(model, data)
         steps = round(_MOVING / model.opt.timestep)
-        q = tree.rest.copy()
         for step in range(steps):
-            q[k] = tree.rest[k] + goal * (step + 1) / steps
-            self._place(tree.forward_kinematics(tree.complete_state(q))[k] @ T)
+            self._place(self._moved(k, T, goal * (step + 1) / steps))
             data.ctrl[:] = self.gripper.force
             self.mujoco.mj_step(model, data)
         moved = float(data.qpos[self.joint[k]] - tree.rest[k])
@@ -233,12 +230,17 @@ class _Trial:
         held = set(self._touched().tolist()) >= set(self.fingers)
         return moved if held and self._is_kept(k, T, moved) else None
 
+    def _moved(self, k: int, T: Array, by: float) -> Array:
+        """The grasp T of part k once its joint has gone so far from rest."""
+        tree = self.obj.tree
+        q = tree.rest.copy()
+        q[k] += by
+        moved: Array = tree.forward_kinematics(tree.complete_state(q))[k] @ T
+        return moved
+
     def _is_kept(self, k: int, T: Array, moved: float) -> bool:
         """Whether the part is in the hand as it was taken, but for what a hand may slip."""
-        tree, hand = self.obj.tree, self.data.body("hand")
-        q = tree.rest.copy()
-        q[k] += moved
-        wanted = tree.forward_kinematics(tree.complete_state(q))[k] @ T
+        hand, wanted = self.data.body("hand"), self._moved(k, T, moved)
         turned = hand.xmat.reshape(3, 3).T @ wanted[:3, :3]
         angle = np.arccos(np.clip(0.5 * (np.trace(turned) - 1.0), -1.0, 1.0))
         return bool(np.linalg.norm(hand.xpos - wanted[:3, 3]) <= _SLIPPED[0] and angle <= _SLIPPED[1])
@@ -286,7 +288,6 @@ def grasp_record(obj: ArticulatedObject, grasps: Grasps, gripper: Gripper) -> di
              "opened": float(grasps.opened[row])} for row in rows
         ]  # fmt: skip
     return {
-        "category": obj.category, "object_id": obj.object_id, "sha256": obj.sha256,
-        "gripper": {name: getattr(gripper, name) for name in gripper.__dataclass_fields__},
+        "category": obj.category, "object_id": obj.object_id, "gripper": asdict(gripper),
         "tried": {obj.parts[k].name: int(grasps.tried[k]) for k in obj.tree.free_joints}, "parts": by_part,
     }  # fmt: skip

@@ -24,7 +24,7 @@ from artsim.export.options import Base, ExportOptions
 from artsim.export.text import numbers
 from artsim.model.draws import joint_intervals
 from artsim.model.kinematics import Array
-from artsim.model.robot import as_robot
+from artsim.model.robot import Robot, as_robot
 from artsim.renderers.scene import Scene, Thing
 
 _STEPS = 9
@@ -73,20 +73,21 @@ def write_simulation(
     if recipe is not None and found is not None and found.get("recipe") == recipe:
         return SceneFiles(folder, tuple(own["name"] for own in found["objects"]), tuple(found["blocked"]))
     things = [_with_bodies(thing) for thing in scene.instances]
+    robots = [as_robot(thing.obj) for thing in things]
     names = tuple(f"{thing.obj.category or 'object'}_{number}" for number, thing in enumerate(things))
     for name, thing in zip(names, things, strict=True):
         export(thing.obj, folder / "objects" / name, ("urdf", "mjcf", "usd"), options=ExportOptions(base))
     write_atomic(folder / "scene.xml", _mjcf(folder, names, things))
-    _add_keyframe(folder / "scene.xml", names, things)
+    _add_keyframe(folder / "scene.xml", names, things, robots)
     write_atomic(folder / "scene.usda", _usd(folder, names, things, base).encode())
-    blocked = _blocked(folder / "scene.xml", names, things)
+    blocked = _blocked(folder / "scene.xml", names, things, robots)
     record = [
         {
             "name": name, "category": thing.obj.category, "object_id": thing.obj.object_id,
             "urdf": f"objects/{name}/{FORMATS['urdf']}", "T_world_object": thing.T_world_object.tolist(),
-            "joints": as_robot(thing.obj).states(thing.q),
+            "joints": robot.states(thing.q),
         }
-        for name, thing in zip(names, things, strict=True)
+        for name, thing, robot in zip(names, things, robots, strict=True)
     ]  # fmt: skip
     content = {"recipe": recipe, "objects": record, "blocked": blocked}
     write_atomic(folder / "scene.json", (json.dumps(content, indent=1) + "\n").encode())
@@ -129,21 +130,21 @@ def _mjcf(folder: Path, names: Sequence[str], things: Sequence[Thing]) -> bytes:
     return text
 
 
-def _add_keyframe(path: Path, names: Sequence[str], things: Sequence[Thing]) -> None:
+def _add_keyframe(path: Path, names: Sequence[str], things: Sequence[Thing], robots: Sequence[Robot]) -> None:
     """The states of the scene, in MuJoCo's order."""
     mujoco = import_mujoco("MJCF files")
 
     model = mujoco.MjModel.from_xml_path(str(path))
     qpos = model.qpos0.copy()
-    for name, thing in zip(names, things, strict=True):
-        for joint, value in as_robot(thing.obj).states(thing.q).items():
+    for name, thing, robot in zip(names, things, robots, strict=True):
+        for joint, value in robot.states(thing.q).items():
             qpos[model.joint(f"{name}/{joint}").qposadr[0]] = value
     root = etree.fromstring(path.read_bytes())
     etree.SubElement(etree.SubElement(root, "keyframe"), "key", name="scene", qpos=numbers(qpos))
     write_atomic(path, etree.tostring(root, pretty_print=True))
 
 
-def _blocked(path: Path, names: Sequence[str], things: Sequence[Thing]) -> list[str]:
+def _blocked(path: Path, names: Sequence[str], things: Sequence[Thing], robots: Sequence[Robot]) -> list[str]:
     """Joints that meet another object, all others being where they are in the scene."""
     mujoco = import_mujoco("MJCF files")
 
@@ -151,23 +152,25 @@ def _blocked(path: Path, names: Sequence[str], things: Sequence[Thing]) -> list[
     data = mujoco.MjData(model)
     owner = model.body_rootid[model.geom_bodyid]
     support = model.geom("support").id
+
+    def meets(name: str, thing: Thing, robot: Robot, k: int, value: float) -> bool:
+        q = thing.q.copy()
+        q[k] = value
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        for joint, state in robot.states(q).items():
+            data.qpos[model.joint(f"{name}/{joint}").qposadr[0]] = state
+        mujoco.mj_forward(model, data)
+        root = model.body_rootid[model.body(f"{name}/{thing.obj.parts[0].name}").id]
+        pairs = [owner[each.geom] for each in data.contact if each.dist < _MEETING and support not in each.geom]
+        return any(one != other and root in (one, other) for one, other in pairs)
+
     found = []
-    for name, thing in zip(names, things, strict=True):
-        tree, intervals = thing.obj.tree, joint_intervals(thing.obj)
-        for k in tree.free_joints:
-            for value in np.linspace(intervals[k, 0], intervals[k, 1], _STEPS):
-                q = thing.q.copy()
-                q[k] = value
-                mujoco.mj_resetDataKeyframe(model, data, 0)
-                for joint, state in as_robot(thing.obj).states(q).items():
-                    data.qpos[model.joint(f"{name}/{joint}").qposadr[0]] = state
-                mujoco.mj_forward(model, data)
-                pairs = [contact.geom for contact in data.contact if contact.dist < _MEETING]
-                root = model.body_rootid[model.body(f"{name}/{thing.obj.parts[0].name}").id]
-                apart = [owner[pair] for pair in pairs if support not in pair]
-                if any(pair[0] != pair[1] and root in pair for pair in apart):
-                    found.append(f"{name}/{tree.joints[k].name}")
-                    break
+    for name, thing, robot in zip(names, things, robots, strict=True):
+        intervals = joint_intervals(thing.obj)
+        for k in thing.obj.tree.free_joints:
+            values = np.linspace(intervals[k, 0], intervals[k, 1], _STEPS)
+            if any(meets(name, thing, robot, k, value) for value in values):
+                found.append(f"{name}/{thing.obj.tree.joints[k].name}")
     return found
 
 
@@ -205,10 +208,11 @@ def _usd(folder: Path, names: Sequence[str], things: Sequence[Thing], base: str)
 
 
 def _quaternion(rotation: Array) -> Array:
+    """w, x, y, z."""
     from scipy.spatial.transform import Rotation
 
-    x, y, z, w = Rotation.from_matrix(rotation).as_quat()
-    return np.array([w, x, y, z])
+    quaternion: Array = Rotation.from_matrix(rotation).as_quat()[[3, 0, 1, 2]]
+    return quaternion
 
 
 def _written(folder: Path) -> dict[str, Any] | None:
