@@ -1,7 +1,7 @@
 """Procedural objects: one file for each category, one line in the registry.
 
-A family is a function ``build(rng) -> Assembly`` that draws a new, plausible object from an explicit generator. It
-draws proportions, details and the shape of the kinematic tree, in metres, with Z up and the front towards -X, and
+A family is a function ``build(draws) -> Assembly`` that draws a new, plausible object: each number and choice by name.
+It draws proportions, details and the shape of the kinematic tree, in metres, with Z up and the front towards -X, and
 leaves a gap between parts in every joint state. ``CONTRIBUTING.md`` shows how to add one.
 """
 
@@ -13,11 +13,13 @@ from importlib import import_module
 import numpy as np
 
 from artsim.errors import ConfigError
-from artsim.families.constraints import Constraints, Given
-from artsim.making.assembly import Assembly, Rng
+from artsim.families.constraints import AXES, LENGTHS, Constraints, Given, measured_length
+from artsim.making.assembly import Assembly
+from artsim.making.draws import Draw, Draws, UnmetError, key_of, ranges, values_of
 from artsim.model.objects import ArticulatedObject
+from artsim.model.params import Params
 
-Family = Callable[[Rng], Assembly]
+Family = Callable[[Draws], Assembly]
 
 CATEGORIES = (
     "bottle",
@@ -108,19 +110,22 @@ PARTNET_MOBILITY: dict[str, tuple[str, ...]] = {
 """The families that stand for each category of PartNet-Mobility, the nearest first."""
 
 DRAWS = 300
-"""Objects that are drawn at most until one meets the constraints: what one in a hundred has is found 19 times of 20."""
+"""Draws at most until one meets the constraints: what one in a hundred has is found 19 times of 20."""
+_RESIZED = 4
+"""Times that an object is planned again to have a length: each leaves a tenth or less of what was amiss."""
 
 
-def make(category: str, seed: int = 0, **constraints: Given) -> ArticulatedObject:
+def make(category: str | Params, seed: int = 0, **constraints: Given) -> ArticulatedObject:
     """A new procedural object: the same for the same category, seed and constraints, different for every other seed.
 
-    Without constraints, the object that the seed stands for. With some, that object if it meets them; else the first
-    that does of others, which depend on the category and the seed alone.
+    Without constraints, the object that the seed stands for. With some, that object as far as it meets them: a
+    parameter that is asked for takes the place of the one that is drawn. Where that is not enough, others are drawn,
+    which depend on the category and the seed alone. Whatever is asked, one object is built.
 
     Parameters
     ----------
-    category : str
-        A key of ``FAMILIES``.
+    category : str or Params
+        A key of ``FAMILIES``; or the parameters of an object (``obj.params``), which is made again.
     seed : int
         Not negative.
     **constraints
@@ -129,12 +134,15 @@ def make(category: str, seed: int = 0, **constraints: Given) -> ArticulatedObjec
         - ``joints``: how many joints; ``joint_types``: exactly which types, such as ``{"revolute"}``;
         - ``size`` (the diagonal), ``height``, ``width``, ``depth``: metres at rest; a single number is met within 5 %;
         - ``handles``, ``legs``: True or False;
-        - any kind of moving part: ``doors=2``, ``drawers=(1, 3)``, ``buttons=0``.
+        - any kind of moving part: ``doors=2``, ``drawers=(1, 3)``, ``buttons=0``;
+        - any other parameter of the family: a number, a range, True or False, an option or a set of options.
+          ``artsim families NAME`` lists them.
 
     Returns
     -------
     ArticulatedObject
-        In its rest state at q = 0, metric, with collision geometry and densities in ``parts[k].body``.
+        In its rest state at q = 0, metric, with collision geometry and densities in ``parts[k].body``, and all that was
+        drawn in ``params``.
 
     Raises
     ------
@@ -146,26 +154,86 @@ def make(category: str, seed: int = 0, **constraints: Given) -> ArticulatedObjec
     --------
     >>> artsim.make("storage_furniture", 7, doors=2, drawers=(1, 3), handles=False)
     """
+    if isinstance(category, Params):
+        return _made_again(category, seed, constraints)
     return make_constrained(category, seed, Constraints.of(constraints))
 
 
 def make_constrained(category: str, seed: int, constraints: Constraints) -> ArticulatedObject:
     """The object that :func:`make` makes under constraints; see there."""
+    _check(category, seed)
+    reached: list[Assembly] = []
+    seen: list[Mapping[str, Draw]] = []
+    for draw in range(DRAWS):
+        draws = Draws(_generator(category, seed, draw), constraints.of_draws)
+        try:
+            made, unmet = FAMILIES[category](draws), constraints.unmet_by
+            missing = unmet(made, draws.drawn)
+            if missing and set(missing) <= set(LENGTHS):
+                made, draws, missing = _resized(category, seed, draw, constraints, made, draws)
+        except UnmetError as problem:
+            seen.append({key_of(problem.name): problem.draw})
+            continue
+        if not missing:
+            params = Params(category, seed, draw, values_of(draws.drawn))
+            source = source_name(category, seed, constraints)
+            return replace(made.build(category, str(seed)), source=source, params=params)
+        reached.append(made)
+        seen.append({key_of(name): draw for name, draw in draws.drawn.items()})
+    raise constraints.refusal(category, reached, {n: d for n, d in ranges(seen).items() if n in constraints.of_draws})
+
+
+def _resized(
+    category: str, seed: int, draw: int, constraints: Constraints, made: Assembly, draws: Draws
+) -> tuple[Assembly, Draws, list[str]]:
+    """The same draw with other lengths among its parameters, so that its box at rest has the ones that are asked for.
+
+    The parameter of a length's name is scaled, and all three for the size.
+    """
+    asked = {name: wanted for name, wanted in constraints.wanted if name in LENGTHS and isinstance(wanted, tuple)}
+    lengths: dict[str, float] = {}
+    for _ in range(_RESIZED):
+        missing = constraints.unmet_by(made, draws.drawn)
+        for name in missing if set(missing) <= set(LENGTHS) else ():
+            low, high = asked[name]
+            if high > 1.04 * low:  # a length at the very end of a range may lie beyond it once it is rounded
+                low, high = 1.02 * low, 0.98 * high
+            now = measured_length(made, name)
+            for side in AXES if name == "size" else (name,):
+                if side in draws.drawn:
+                    lengths[side] = float(draws.drawn[side].value) * min(max(now, low), high) / now
+        if not missing or not lengths:
+            break
+        draws = Draws(_generator(category, seed, draw), {**constraints.of_draws, **lengths})
+        made = FAMILIES[category](draws)
+    return made, draws, constraints.unmet_by(made, draws.drawn)
+
+
+def _made_again(params: Params, seed: int, constraints: Mapping[str, Given]) -> ArticulatedObject:
+    if seed or constraints:
+        raise ConfigError("parameters say all of an object", "artsim.make", "change them: params.having(width=0.5)")
+    _check(params.category, params.seed)
+    draws = Draws(_generator(params.category, params.seed, params.draw), params.values, lenient=True)
+    made = FAMILIES[params.category](draws).build(params.category, str(params.seed))
+    source = f"parameters of {params.category}:{params.seed}"
+    return replace(made, source=source, params=replace(params, values=values_of(draws.drawn)))
+
+
+def _check(category: str, seed: int) -> None:
     if category not in FAMILIES:
         raise ConfigError(f"there is no category {category!r}", fix=f"use one of {', '.join(sorted(FAMILIES))}")
     if seed < 0:
         raise ConfigError(f"seed {seed} is negative", fix="use 0 or more")
-    drawn = []
-    for draw in range(DRAWS):
-        drawn.append(FAMILIES[category](_generator(category, seed, draw)).build(category, str(seed)))
-        if constraints.met_by(drawn[-1]):
-            return replace(drawn[-1], source=source_name(category, seed, constraints))
-    raise constraints.refusal(category, drawn)
 
 
 def assembly_of(category: str, seed: int) -> Assembly:
-    """Parts and joints of the object of a seed before its solids are united, which takes most of the time."""
-    return FAMILIES[category](_generator(category, seed, 0))
+    """Parts and joints of the object of a seed before its solids are made, which takes most of the time."""
+    return FAMILIES[category](draws_of(category, seed))
+
+
+def draws_of(category: str, seed: int) -> Draws:
+    """What the object of a seed is drawn from, before anything is drawn."""
+    return Draws(_generator(category, seed, 0))
 
 
 def source_name(category: str, seed: int, constraints: Constraints) -> str:
@@ -173,7 +241,7 @@ def source_name(category: str, seed: int, constraints: Constraints) -> str:
     return f"{category}[{constraints}]:{seed}" if constraints else f"{category}:{seed}"
 
 
-def _generator(category: str, seed: int, draw: int) -> Rng:
+def _generator(category: str, seed: int, draw: int) -> np.random.Generator:
     """Of a draw for a seed; the first is that of the seed's own object."""
     own = zlib.crc32(category.encode())
     return np.random.default_rng([own, seed] if draw == 0 else [own, _FURTHER, draw, seed])

@@ -5,8 +5,9 @@ import sys
 from collections import Counter
 
 from artsim.errors import ConfigError
-from artsim.families import FAMILIES, make
-from artsim.families.constraints import FEATURES, LENGTHS, measured
+from artsim.families import FAMILIES, draws_of
+from artsim.families.constraints import FEATURES, LENGTHS, described, measured, measured_length
+from artsim.making.draws import ranges
 
 
 def parameters(category: str) -> str:
@@ -33,23 +34,35 @@ def describe_family(category: str, count: int = 20) -> str:
     if count < 1:
         raise ConfigError(f"{count} is not a count", "objects", "use 1 or more")
     text = parameters(category)
-    objects = [make(category, seed) for seed in range(count)]
-    types = Counter(kind for obj in objects for kind in set(obj.tree.types[1:]))
-    parts: dict[str, list[int]] = {part.label: [] for obj in objects for part in obj.parts[1:]}
-    for label, counts in parts.items():
-        counts += [sum(part.label == label for part in obj.parts[1:]) for obj in objects]
-    rows = [
-        ("parts", _range([len(obj) for obj in objects])),
+    traces, made = [], []
+    for seed in range(count):
+        traces.append(draws_of(category, seed))
+        made.append(FAMILIES[category](traces[-1]))
+    types = Counter(kind for assembly in made for kind in set(assembly.joint_types[1:]))
+    kinds = sorted({label for assembly in made for label in assembly.labels[1:]})
+    moving = [f"{kind} {_range([assembly.labels[1:].count(kind) for assembly in made])}" for kind in kinds]
+    lines = [
+        ("parts", _range([len(assembly) for assembly in made])),
         ("joint types", ", ".join(f"{kind} ({number})" for kind, number in sorted(types.items()))),
-        ("moving parts", ", ".join(f"{label} {_range(counts)}" for label, counts in sorted(parts.items()))),
+        ("moving parts", ", ".join(moving)),
     ]
     for name in LENGTHS:
-        values = [float(measured(obj, name)) for obj in objects]  # type: ignore[arg-type]
-        rows.append((name, f"{min(values):.3g} to {max(values):.3g} m"))
-    rows += [(name, f"{sum(bool(measured(obj, name)) for obj in objects)} have some") for name in FEATURES]
-    lines = [f"  {name:13s} {value}" for name, value in rows]
+        values = [measured_length(assembly, name) for assembly in made]
+        lines.append((name, f"{min(values):.3g} to {max(values):.3g} m"))
+    lines += [(name, f"{sum(bool(measured(assembly, name)) for assembly in made)} have some") for name in FEATURES]
+    seen = Counter(name for trace in traces for name in trace.drawn)
+    drawn = ranges(trace.drawn for trace in traces)
+    named = [(name, f"{described(draw)}{'' if seen[name] == count else f' ({seen[name]} have it)'}")
+             for name, draw in drawn.items() if draw.kind != "seed"]  # fmt: skip
     return "\n".join([category, *(f"  {line}".rstrip() for line in text.splitlines()), "",
-                      f"  of {count} objects:", *lines, ""])  # fmt: skip
+                      f"  of {count} objects:", *_rows(lines), "",
+                      f"  parameters, as {count} objects draw them:", *_rows(named), ""])  # fmt: skip
+
+
+def _rows(pairs: list[tuple[str, str]]) -> list[str]:
+    """Lines of a name and what it says, one below the other."""
+    wide = max((len(name) for name, _ in pairs), default=0)
+    return [f"  {name:{wide}s} {value}" for name, value in pairs]
 
 
 def _range(numbers: list[int]) -> str:

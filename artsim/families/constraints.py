@@ -1,8 +1,8 @@
-"""What a user may ask of a procedural object: numbers of parts and joints, joint types, size, handles and legs.
+"""What a user may ask of a procedural object: its parameters, and what it has: parts, joints, a size, handles, legs.
 
-A constraint has a name and a wanted value. The names are those of ``NAMES``; any other is a kind of moving part, such
-as ``door``: words of a part's label. The same names serve :func:`artsim.make`, the command line and the names
-of sources: ``door=2,drawer=1..3,handles=no``.
+A constraint has a name and a wanted value. The names are those of ``NAMES``; any other is a parameter of the family,
+such as ``handle_length``, or a kind of moving part, such as ``door``: words of a part's label. The same names serve
+:func:`artsim.make`, the command line and the names of sources: ``door=2,drawer=1..3,handles=no``.
 """
 
 from __future__ import annotations
@@ -14,25 +14,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from artsim.common.products import norm
 from artsim.errors import ConfigError
+from artsim.making.assembly import Assembly
+from artsim.making.draws import Draw, Interval, key_of
 from artsim.model.joints import JOINT_TYPES
-from artsim.model.objects import ArticulatedObject
 
-Interval = tuple[float, float]
 Wanted = Interval | bool | frozenset[str]
-"""Least and greatest value, yes or no, or joint types."""
+"""Least and greatest value, yes or no, or options such as joint types."""
 Given = int | float | bool | str | Sequence[int | float | None] | Collection[str]
 """What :func:`artsim.make` takes for one constraint."""
 
 LENGTHS = ("size", "height", "width", "depth")
 """The diagonal of the object's box at rest, and its extents along Z, Y and X, metres."""
+AXES = {"depth": 0, "width": 1, "height": 2}
 FEATURES = ("handles", "legs")
 """What families record of an object besides its parts; see :meth:`artsim.making.assembly.Assembly.record`."""
 NAMES = ("joints", "joint_types", *LENGTHS, *FEATURES)
 TOLERANCE = 0.05
 """Share by which a length may miss a single number that is asked for: hardly any draw meets it exactly."""
 _SHOWN = 8
-_KIND = re.compile(r"[a-z]+(_[a-z]+)*")
+_KIND = re.compile(r"[a-z]+(_[a-z0-9]+)*")
+_OPTION = re.compile(r"[A-Za-z][\w -]*")
 _YES, _NO = ("yes", "true"), ("no", "false")
 
 
@@ -80,47 +83,87 @@ class Constraints:
         """As :meth:`parse` reads it, joined by commas."""
         return ",".join(f"{name}={_text(value)}" for name, value in self.wanted)
 
-    def met_by(self, obj: ArticulatedObject) -> bool:
-        """Whether an object meets all of them."""
-        return all(_meets(measured(obj, name), name, wanted) for name, wanted in self.wanted)
+    @property
+    def of_draws(self) -> dict[str, Wanted]:
+        """What is asked of draws by their names."""
+        return {name: value for name, value in self.wanted if name not in NAMES}
 
-    def refusal(self, category: str, objects: Sequence[ArticulatedObject]) -> ConfigError:
-        """The error that says what objects of a category reach, where none of them meets the constraints."""
-        reached = {name: [measured(obj, name) for obj in objects] for name, _ in self.wanted}
-        unmet = [
-            name for name, wanted in self.wanted if not any(_meets(value, name, wanted) for value in reached[name])
+    def unmet_by(self, made: Assembly, drawn: Mapping[str, Draw]) -> list[str]:
+        """Names of those that an object does not meet, whose draws are in ``drawn``."""
+        parameters = {key_of(name) for name in drawn}
+        return [name for name, wanted in self.wanted if not _met(made, name, wanted, name in parameters)]
+
+    def refusal(self, category: str, reached: Sequence[Assembly], drawn: Mapping[str, Draw]) -> ConfigError:
+        """The error that says what objects of a category reach, where none of them meets the constraints.
+
+        ``drawn`` has the parameters of these names, as far as the family draws any.
+        """
+        apart = [
+            name for name, wanted in self.wanted if not any(_met(made, name, wanted, name in drawn) for made in reached)
         ]
-        shown = "; ".join(_reached(name, reached[name]) for name in unmet or reached)
-        alone = "" if unmet else ", each is met, but not all of them at once"
-        kinds = sorted({part.label for obj in objects for part in obj.parts[1:]})
+        shown = []
+        for name in apart or [name for name, _ in self.wanted]:
+            counted = name in NAMES or any(count_parts(made, name) for made in reached) or name not in drawn
+            shown.append(
+                _reached(name, [measured(made, name) for made in reached])
+                if counted and reached
+                else f"{name} {described(drawn[name]) if name in drawn else '0'}"
+            )
+        kinds = sorted({label for made in reached for label in made.labels[1:]})
         return ConfigError(
-            f"none of {len(objects)} objects drawn has {self}{alone}. Drawn are {shown}",
+            f"no object drawn has {self}{'' if apart else ', each is met, but not all of them at once'}. "
+            f"Drawn are {'; '.join(shown)}",
             category,
-            f"ask for values that are drawn, of {', '.join(NAMES)}, or of its parts {', '.join(kinds)}; "
-            "or leave a constraint out",
+            f"ask for values that are drawn, of {', '.join(NAMES)}, of its parts {', '.join(kinds)}, or of its "
+            f"parameters ('artsim families {category}' lists them); or leave a constraint out",
         )
 
 
 NO_CONSTRAINTS = Constraints()
 
 
-def count_parts(obj: ArticulatedObject, kind: str) -> int:
+def count_parts(made: Assembly, kind: str) -> int:
     """How many moving parts are of a kind: their label has its words, as ``temple_left`` has ``temple``."""
-    return sum(f"_{kind}_" in f"_{part.label}_" for part in obj.parts[1:])
+    return sum(f"_{kind}_" in f"_{label}_" for label in made.labels[1:])
 
 
-def measured(obj: ArticulatedObject, name: str) -> float | bool | frozenset[str]:
-    """The value of an object that a constraint of this name is about."""
+def measured(made: Assembly, name: str) -> float | bool | frozenset[str]:
+    """The value of an object that a constraint of this name is about; a number of parts, unless it is of ``NAMES``."""
     if name == "joints":
-        return len(obj) - 1
+        return len(made) - 1
     if name == "joint_types":
-        return frozenset(obj.tree.types[1:])
+        return frozenset(made.joint_types[1:])
     if name in LENGTHS:
-        extents = obj.bounds[1] - obj.bounds[0]
-        return obj.diagonal if name == "size" else float(extents[{"height": 2, "width": 1, "depth": 0}[name]])
+        return measured_length(made, name)
     if name in FEATURES:
-        return name in obj.features or count_parts(obj, name.removesuffix("s")) > 0
-    return count_parts(obj, name)
+        return name in made.features or count_parts(made, name.removesuffix("s")) > 0
+    return count_parts(made, name)
+
+
+def measured_length(made: Assembly, name: str) -> float:
+    """One of ``LENGTHS`` of an object at rest, metres."""
+    extents = made.extents()
+    return float(norm(extents) if name == "size" else extents[AXES[name]])
+
+
+def described(draw: Draw) -> str:
+    """What a draw may give, as text: "0.4 to 0.6 m", "bar, bow or none"."""
+    if draw.kind == "choice":
+        return ", ".join(draw.options)
+    if draw.kind == "yes or no":
+        return f"{draw.kind}, yes in {100 * draw.high:.3g} %"
+    if draw.kind == "seed":
+        return "a seed of details"
+    return f"{draw.low:.4g} to {draw.high:.4g} {draw.unit}".rstrip()
+
+
+def _met(made: Assembly, name: str, wanted: Wanted, drawn: bool) -> bool:
+    """Whether an object meets a constraint; a parameter that is ``drawn`` has the value that is asked for."""
+    if name in NAMES:
+        return _meets(measured(made, name), name, wanted)
+    if drawn and (not isinstance(wanted, tuple) or count_parts(made, name) == 0):
+        return True
+    return isinstance(wanted, tuple) and _meets(measured(made, name), name, wanted)
 
 
 def _meets(value: float | bool | frozenset[str], name: str, wanted: Wanted) -> bool:
@@ -135,12 +178,11 @@ def _name(name: str) -> str:
     """The name of a constraint; a kind of part may stand in the plural."""
     if name in NAMES:
         return name
-    single = name.removesuffix("s") if not name.endswith("ss") else name
-    if not _KIND.fullmatch(single):
+    if not _KIND.fullmatch(name):
         raise ConfigError(
-            f"{name!r} is no constraint", fix=f"use {', '.join(NAMES)}, or a kind of part such as door or drawer"
+            f"{name!r} is no constraint", fix=f"use {', '.join(NAMES)}, a parameter, or a kind of part such as door"
         )
-    return single
+    return key_of(name)
 
 
 def _wanted(name: str, value: Given) -> Wanted:
@@ -150,38 +192,39 @@ def _wanted(name: str, value: Given) -> Wanted:
     ------
     ConfigError
     """
-    if name in FEATURES:
-        if not isinstance(value, (bool, np.bool_)):
-            raise ConfigError(f"{name} is {value!r}", fix=f"write {name}=True or {name}=False (yes or no)")
+    if isinstance(value, (bool, np.bool_)) and name not in ("joints", "joint_types", *LENGTHS):
         return bool(value)
-    if name == "joint_types":
-        types = frozenset([value] if isinstance(value, str) else value)  # type: ignore[arg-type]
-        if not types or not types <= set(JOINT_TYPES[1:]):
-            raise ConfigError(
-                f"joint_types is {'+'.join(map(str, types)) or 'empty'}",
-                fix=f"use some of {', '.join(JOINT_TYPES[1:])}",
-            )
-        return types  # type: ignore[return-value]
+    if name in FEATURES:
+        raise ConfigError(f"{name} is {value!r}", fix=f"write {name}=True or {name}=False (yes or no)")
+    if name == "joint_types" or isinstance(value, (str, set, frozenset)):
+        options = frozenset([value] if isinstance(value, str) else value)  # type: ignore[arg-type]
+        if name in ("joints", *LENGTHS):
+            raise ConfigError(f"{name} is {value!r}", fix=f"write {name}=2, or a range: {name}=(1, 3)")
+        if not options or (name == "joint_types" and not options <= set(JOINT_TYPES[1:])):
+            known = f"some of {', '.join(JOINT_TYPES[1:])}" if name == "joint_types" else "an option"
+            raise ConfigError(f"{name} is {'+'.join(map(str, options)) or 'empty'}", fix=f"use {known}")
+        return options  # type: ignore[return-value]
     ends = value if isinstance(value, (tuple, list)) else (value, value)
     if len(ends) != 2 or any(isinstance(end, (bool, str)) for end in ends):
         raise ConfigError(f"{name} is {value!r}", fix=f"write {name}=2, or a range: {name}=(1, 3)")
+    least = 0.0 if name in NAMES else -np.inf
     try:
-        low, high = (float(limit if end is None else end) for end, limit in zip(ends, (0.0, np.inf), strict=True))
+        low, high = (float(limit if end is None else end) for end, limit in zip(ends, (least, np.inf), strict=True))
     except (TypeError, ValueError) as error:
         raise ConfigError(f"{name} is {value!r}", fix=f"write {name}=2, or a range: {name}=(1, 3)") from error
-    if not 0.0 <= low <= high:
-        raise ConfigError(f"{name} from {low:g} to {high:g} is no range", fix="write the smaller number, from 0, first")
-    if name not in LENGTHS and not all(end == round(end) for end in (low, high) if np.isfinite(end)):
+    if not least <= low <= high:
+        raise ConfigError(f"{name} from {low:g} to {high:g} is no range", fix="write the smaller number first")
+    if name == "joints" and not all(end == round(end) for end in (low, high) if np.isfinite(end)):
         raise ConfigError(f"{name} is {value!r}", fix=f"a number of {name}s is whole")
     return low, high
 
 
 def _value(name: str, text: str) -> Given:
     """The value that a text stands for."""
-    if name in FEATURES:
-        if text.lower() not in _YES + _NO:
-            raise ConfigError(f"{name} is {text!r}", "having", f"write {name}=yes or {name}=no")
+    if text.lower() in _YES + _NO and name not in ("joints", "joint_types", *LENGTHS):
         return text.lower() in _YES
+    if name in FEATURES:
+        raise ConfigError(f"{name} is {text!r}", "having", f"write {name}=yes or {name}=no")
     if name == "joint_types":
         return text.split("+")
     ends = text.split("..")
@@ -190,6 +233,8 @@ def _value(name: str, text: str) -> Given:
     except ValueError:
         numbers = []
     if not 1 <= len(numbers) <= 2 or numbers == [None]:
+        if name not in NAMES and all(_OPTION.fullmatch(option) for option in text.split("+")):
+            return set(text.split("+"))
         raise ConfigError(f"{name} is {text!r}", "having", f"write {name}=2, or a range: {name}=1..3, {name}=1..")
     return numbers if len(numbers) == 2 else numbers[0]  # type: ignore[return-value]
 
@@ -202,7 +247,7 @@ def _text(value: float | Wanted) -> str:
         return "+".join(sorted(value))
     if isinstance(value, tuple):
         low, high = value
-        return _text(low) if low == high else f"{_text(low)}..{_text(high) if np.isfinite(high) else ''}"
+        return _text(low) if low == high else "..".join(_text(end) if np.isfinite(end) else "" for end in value)
     return str(int(value)) if value == round(value) else repr(float(value))
 
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from artsim.common.elementary import arctan2, cos, sin
 from artsim.common.products import unit
 from artsim.making.assembly import JointSpec, revolute
-from artsim.making.outlines import Span, Vector, ends, rounded_rectangle
+from artsim.making.outlines import FRONT, Span, Vector, ends, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, prism, rod, tube, union
 from artsim.model.kinematics import Array
 
@@ -20,7 +20,8 @@ def bar_handle(start: Vector, end: Vector, outward: Vector, reach: float, radius
     lifted = outward * reach
     posts = (start + share * (end - start) for share in (0.1, 0.9))
     bar = tube([start + lifted, end + lifted], radius)
-    return bar + union(tube([foot - 0.002 * outward, foot + lifted], 0.8 * radius, 10) for foot in posts)
+    bar += union(tube([foot - 0.002 * outward, foot + lifted], 0.8 * radius, 10) for foot in posts)
+    return bar.called("handle", outward)
 
 
 def bow_handle(start: Vector, end: Vector, outward: Vector, reach: float, radius: float) -> Solid:
@@ -29,7 +30,7 @@ def bow_handle(start: Vector, end: Vector, outward: Vector, reach: float, radius
     angles = np.linspace(0.0, np.pi, 9)
     shares = 0.5 - 0.5 * cos(angles)
     path: Array = start + shares[:, None] * (end - start) + (reach * sin(angles) - 0.002)[:, None] * outward
-    return tube(path, radius, 10)
+    return tube(path, radius, 10).called("handle", outward)
 
 
 def knob(foot: Vector, outward: Vector, reach: float, radius: float) -> Solid:
@@ -37,7 +38,7 @@ def knob(foot: Vector, outward: Vector, reach: float, radius: float) -> Solid:
     foot, outward = np.asarray(foot, dtype=np.float64), np.asarray(outward, dtype=np.float64)
     neck = foot + reach * outward
     stem = cylinder(foot - 0.002 * outward, neck, 0.4 * radius, sections=12)
-    return stem + cylinder(neck, neck + 0.5 * radius * outward, radius, 0.8 * radius, 20)
+    return (stem + cylinder(neck, neck + 0.5 * radius * outward, radius, 0.8 * radius, 20)).called("knob", outward)
 
 
 def panel(kind: str, low: Vector, high: Vector, rail: float, recess: float) -> Solid:
@@ -66,7 +67,7 @@ def panel(kind: str, low: Vector, high: Vector, rail: float, recess: float) -> S
                 bar_low[axis], bar_high[axis] = edge - 0.2 * rail, edge + 0.2 * rail
                 bars += box(bar_low, bar_high)
         inner_low[0], inner_high[0] = middle - 0.002, middle + 0.002
-        return bars + box(inner_low, inner_high)
+        return bars + box(inner_low, inner_high).called("glass", FRONT)
     board = box(inner_low + (recess, 0, 0), inner_high - (0.001, 0, 0))
     if kind == "raised":
         ledge = 0.25 * rail
@@ -105,7 +106,7 @@ def flat_handle(start: Vector, end: Vector, reach: float, thickness: float, dept
     for share in (0.06, 0.94):
         foot = start + share * (end - start)
         solid += box(foot - half + 0.5 * (front + back), foot + half + (0.002, 0.0, 0.0))
-    return solid
+    return solid.called("handle", FRONT)
 
 
 def dial(foot: Vector, outward: Vector, reach: float, radius: float, sections: int = 24) -> Solid:
@@ -121,7 +122,7 @@ def dial(foot: Vector, outward: Vector, reach: float, radius: float, sections: i
         for a in (-1, 1)
         for b in (-1, 1)
     ]
-    return solid + hull(corners)
+    return (solid + hull(corners)).called("knob", outward)
 
 
 def holed_plate(low: Vector, high: Vector, center: Vector, radius: float, axis: int = 0, sections: int = 24) -> Solid:
@@ -156,7 +157,7 @@ def windowed_panel(low: Vector, high: Vector, margins: Sequence[float], pane: fl
     left, right, bottom, top = np.asarray(margins, dtype=np.float64) - 0.002
     x = low[0] + inset
     glass = box((x, x + pane), (low[1] + left, high[1] - right), (low[2] + bottom, high[2] - top))
-    return frame(low, high, margins) + glass
+    return frame(low, high, margins) + glass.called("glass", FRONT)
 
 
 def wire_shelf(low: Vector, high: Vector, bars: int, wire: float) -> Solid:
@@ -218,7 +219,9 @@ def push_button(face: Vector, size: Vector, round_off: float) -> Solid:
     """
     face = np.asarray(face, dtype=np.float64)
     half = np.array([0.0, 0.5 * size[0], 0.5 * size[1]])
-    return box(face - half - (0.008, 0, 0), face + half - (0.0022, 0, 0), fillet=round_off, axis=0)
+    return box(face - half - (0.008, 0, 0), face + half - (0.0022, 0, 0), fillet=round_off, axis=0).called(
+        "button", FRONT
+    )
 
 
 def cheeks(

@@ -8,8 +8,8 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel
-from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
+from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.draws import Draws
 from artsim.making.outlines import turns
 from artsim.making.solids import Solid, box, posts, rod, tray, union
 from artsim.model.kinematics import Array
@@ -17,65 +17,67 @@ from artsim.model.kinematics import Array
 GAP = 0.0015
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """A microwave oven, closed at rest. The back of its door is the plane x = 0."""
-    width, depth = rng.uniform(0.42, 0.62), with_tails(rng, (0.30, 0.48), (0.16, 0.62))
-    height = with_tails(rng, (0.23, 0.37), (0.2, 0.46))
-    wall, thick = rng.uniform(0.012, 0.03), with_tails(rng, (0.018, 0.045), (0.008, 0.045))
-    foot = rng.uniform(0.006, 0.018)
-    drops = bool(rng.random() < 0.15)  # the door falls open, its controls below or above it
-    mirrored = bool(rng.random() < 0.15)
+    width = draws.length("width", (0.42, 0.62))
+    depth = draws.length("depth", (0.30, 0.48), (0.16, 0.62))
+    height = draws.length("height", (0.23, 0.37), (0.2, 0.46))
+    wall = draws.length("wall", (0.012, 0.03))
+    thick = draws.length("door_thickness", (0.018, 0.045), (0.008, 0.045))
+    foot = draws.length("foot_height", (0.006, 0.018))
+    drops = draws.chance("door_drops", 0.15)  # the door falls open, its controls below or above it
+    mirrored = draws.chance("mirrored", 0.15)
     half = 0.5 * width
     # Controls take the strip of the front that the door leaves: at -Y (before mirroring), or below it.
-    strip = with_tails(rng, (0.17, 0.33), (0.17, 0.5)) * width if rng.random() < 0.88 else 0.0
+    has_panel = draws.chance("controls", 0.88)
+    strip = draws.number("controls_width", (0.17, 0.33), (0.17, 0.5)) * width if has_panel else 0.0
     low, high = np.array([-thick, strip - half, foot]), np.array([0.0, half, foot + height])
     panel_low, panel_high = np.array([-thick, -half, foot]), np.array([0.0, strip - half - GAP, foot + height])
     if drops:
-        strip = rng.uniform(0.16, 0.26) * height
+        has_panel, strip = True, draws.number("controls_height", (0.16, 0.26)) * height
         low[1:], high[1:] = (-half, foot + strip), (half, foot + height)
         panel_high[1:] = half, foot + strip - GAP
-    elif rng.random() < 0.25:  # door and panel within a rim
+    elif draws.chance("rim", 0.25):  # door and panel within a rim
         low[2] += wall
         high[2] -= wall
 
     hollow_low = np.array([GAP, low[1] + wall, (low[2] if drops else foot) + wall])
     hollow_high = np.array([depth - wall, half - wall, foot + height - wall])
-    body = _body(rng, panel_low[1], half, foot, foot + height, depth, hollow_low, hollow_high)
+    body = _body(draws, panel_low[1], half, foot, foot + height, depth, hollow_low, hollow_high)
     if low[2] > foot and not drops:
         body += union(box((-thick, 0.01), half, (z, z + wall - GAP)) for z in (foot, high[2] + GAP))
     oven = Assembly()
-    has_panel = strip > 0
     if has_panel:
         body += box(panel_low, panel_high + (0.01, 0, 0), fillet=0.004, axis=1)
-    opener = bool(has_panel and not drops and rng.random() < 0.35)
-    controls, movers = _controls(rng, panel_low, panel_high, opener) if has_panel else (Solid(), [])
-    handle = "none" if opener else pick(rng, ["bar", "bow", "flat", "none"])
+    opener = has_panel and not drops and draws.chance("opening_button", 0.35)
+    controls, movers = _controls(draws, panel_low, panel_high, opener) if has_panel else (Solid(), [])
+    handle = "none" if opener else draws.pick("handle", ["bar", "bow", "flat", "none"])
     oven.record(handles=handle != "none")
-    door = _door(rng, low, high, drops, handle)
+    door = _door(draws, low, high, drops, handle)
 
     def placed(solid: Solid) -> Solid:
         return solid.mirrored(1) if mirrored else solid
 
     sign = -1.0 if mirrored else 1.0
     oven.add("body", placed(body + controls), density=350.0)
-    angle = np.deg2rad(90.0 if drops else with_tails(rng, (90.0, 150.0), (45.0, 170.0)))
+    angle = np.deg2rad(90.0 if drops else draws.degrees("door_angle", (90.0, 150.0), (45.0, 170.0)))
     # The axis of a thin door may stand at the front face: the free edge of a thick one would run into the panel.
-    outer = thick if thick * thick < GAP * (high[1] - low[1]) and rng.random() < 0.5 else 0.0
+    outer = thick if thick * thick < GAP * (high[1] - low[1]) and draws.chance("hinge_at_face", 0.5) else 0.0
     drop = revolute("body", (0, -1, 0), (-thick, 0, low[2]), 0.0, angle)
     oven.add("door", placed(door), drop if drops else side_hinge(-outer, sign * half, angle, not mirrored))
     for name, solid, point in movers:
         point = point * (1.0, sign, 1.0)
         turns = continuous("body", (-1, 0, 0), point)
         oven.add(name, placed(solid), turns if "dial" in name else prismatic("body", (1, 0, 0), 0.0, 0.0015, point))
-    if rng.random() < 0.75:
+    if draws.chance("turntable", 0.75):
         center = 0.5 * (hollow_low + hollow_high)
-        plate = _turntable(rng, hollow_low, hollow_high, center)
+        plate = _turntable(draws, hollow_low, hollow_high, center)
         oven.add("turntable", placed(plate), continuous("body", (0, 0, 1), center * (1, sign, 1)), density=2000.0)
     return oven
 
 
 def _body(
-    rng: Rng, right: float, left: float, low: float, high: float, depth: float, inner: Array, outer: Array
+    draws: Draws, right: float, left: float, low: float, high: float, depth: float, inner: Array, outer: Array
 ) -> Solid:
     """Case around the hollow from ``inner`` to ``outer``, which is open to the front."""
     shell = 0.012
@@ -86,26 +88,26 @@ def _body(
     solid += box((GAP, outer[0] + 0.01), (outer[1], left - 0.002), (low + 0.002, high - 0.002))
     solid += box((outer[0], depth - 0.002), (inner[1] - 0.01, left - 0.002), (low + 0.002, high - 0.002))
     solid += posts((0.05, depth - 0.05), (right + 0.05, left - 0.05), (0, low + 0.004), 0.015)
-    if rng.random() < 0.4:  # ribs over the vents
+    if draws.chance("ribs", 0.4):  # ribs over the vents
         for x in np.linspace(0.4, 0.8, 7) * depth:
             upright = (low + 0.55 * (high - low), low + 0.85 * (high - low))
             solid += box((x, x + 0.006), (left - 0.005, left + 0.0025), upright)
     return solid
 
 
-def _door(rng: Rng, low: Array, high: Array, drops: bool, handle: str) -> Solid:
+def _door(draws: Draws, low: Array, high: Array, drops: bool, handle: str) -> Solid:
     """Door with a window, handle at the side away from its hinge."""
     tall, wide = high[2] - low[2], high[1] - low[1]
-    edge = rng.uniform(0.02, 0.06)
+    edge = draws.length("door_edge", (0.02, 0.06))
     margins = np.array([edge + (0.0 if drops or handle == "none" else 0.035), edge, edge, edge])
     margins[3] += 0.045 if drops and handle != "none" else 0.0
-    if rng.random() < 0.75:
-        solid = windowed_panel(low, high, list(margins), 0.004, rng.uniform(0.0015, 0.008))
+    if draws.chance("window", 0.75):
+        solid = windowed_panel(low, high, list(margins), 0.004, draws.length("window_inset", (0.0015, 0.008)))
     else:
         solid = box(low, high, fillet=0.004)
         solid += box(low + (-0.0015, margins[0], margins[2]), high - (0.004, margins[1], margins[3]))
-    radius, reach = rng.uniform(0.005, 0.009), rng.uniform(0.025, 0.042)
-    inside = rng.uniform(0.08, 0.25)
+    radius, reach = draws.length("handle_radius", (0.005, 0.009)), draws.length("handle_reach", (0.025, 0.042))
+    inside = draws.number("handle_inset", (0.08, 0.25))
     start = low + (0, 0.024, inside * tall)
     end = np.array([low[0], start[1], high[2] - inside * tall])
     if drops:
@@ -114,7 +116,7 @@ def _door(rng: Rng, low: Array, high: Array, drops: bool, handle: str) -> Solid:
     return solid + front_handle(handle, start, end, reach, radius)
 
 
-def _controls(rng: Rng, low: Array, high: Array, opener: bool) -> tuple[Solid, list[tuple[str, Solid, Array]]]:
+def _controls(draws: Draws, low: Array, high: Array, opener: bool) -> tuple[Solid, list[tuple[str, Solid, Array]]]:
     """What stays on the panel, and what moves: names, solids and places."""
     upright = high[2] - low[2] > high[1] - low[1]
     long, short = (2, 1) if upright else (1, 2)
@@ -135,14 +137,16 @@ def _controls(rng: Rng, low: Array, high: Array, opener: bool) -> tuple[Solid, l
     if opener:
         keys = [0.12 * size[long], 0.75 * size[short]]
         movers.append(("button_1", push_button(at(-0.39), keys if short == 2 else keys[::-1], 0.003), at(-0.39)))
-    if rng.random() < 0.5:
-        radius = min(0.36 * size[short], 0.1 * size[long], 0.03) * with_tails(rng, (0.9, 1.0), (0.55, 1.0))
-        reach, lower = with_tails(rng, (0.012, 0.022), (0.004, 0.022)), 0.0 if opener else rng.uniform(0.0, 0.12)
-        for number, along in enumerate((0.15 - lower, -0.15 - lower)[: int(rng.integers(1, 3))], 1):
+    if draws.chance("dials", 0.5):
+        radius = min(0.36 * size[short], 0.1 * size[long], 0.03)
+        radius *= draws.number("dial_radius", (0.9, 1.0), (0.55, 1.0))
+        reach = draws.length("dial_reach", (0.012, 0.022), (0.004, 0.022))
+        lower = 0.0 if opener else draws.number("dials_lower", (0.0, 0.12))
+        for number, along in enumerate((0.15 - lower, -0.15 - lower)[: draws.integer("dial_count", 1, 2)], 1):
             movers.append((f"dial_{number}", dial(at(along), (-1, 0, 0), reach, radius), at(along)))
         return fixed, movers
-    rows, columns = int(rng.integers(3, 6)), int(rng.integers(2, 4))
-    moving = rng.random() < 0.35
+    rows, columns = draws.integer("key_rows", 3, 5), draws.integer("key_columns", 2, 3)
+    moving = draws.chance("keys_move", 0.35)
     key = (0.7 * 0.72 / columns * size[short], 0.45 / rows * 0.6 * size[long])
     count = 2 if opener else 1
     for along in np.linspace(0.2, -0.22, rows):
@@ -158,12 +162,12 @@ def _controls(rng: Rng, low: Array, high: Array, opener: bool) -> tuple[Solid, l
     return fixed, movers
 
 
-def _turntable(rng: Rng, low: Array, high: Array, center: Array) -> Solid:
+def _turntable(draws: Draws, low: Array, high: Array, center: Array) -> Solid:
     """Glass plate with a raised rim of beads, 3 mm above the floor."""
     x, y, z = center[0], center[1], low[2] + 0.002
-    radius = 0.5 * min(high[0] - low[0], high[1] - low[1]) - rng.uniform(0.006, 0.02)
+    radius = 0.5 * min(high[0] - low[0], high[1] - low[1]) - draws.length("turntable_clearance", (0.006, 0.02))
     solid = rod(x, y, (z + 0.006, z + 0.012), 0.93 * radius, radius, 32)
-    solid += rod(x, y, (z, z + 0.008), rng.uniform(0.03, 0.05), sections=12)
+    solid += rod(x, y, (z, z + 0.008), draws.length("turntable_hub", (0.03, 0.05)), sections=12)
     for a in turns(3):
         point = np.array([x + 0.8 * radius * cos(a), y + 0.8 * radius * sin(a), z + 0.012])
         solid += box(point - (0.012, 0.006, 0.003), point + (0.012, 0.006, 0.0015))

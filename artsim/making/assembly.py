@@ -8,6 +8,7 @@ import numpy as np
 
 from artsim.common.products import apply, unit
 from artsim.errors import AssetError, KinematicsError
+from artsim.making.draws import Rng as Rng
 from artsim.making.outlines import Vector
 from artsim.making.solids import Solid
 from artsim.model.joints import Joint, Mimic
@@ -15,8 +16,6 @@ from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import ArticulatedObject, Body, Part, content_sha256
 from artsim.model.transforms import rotation_about
 
-Rng = np.random.Generator
-"""What families draw from: an explicit generator, never a global one."""
 Choice = TypeVar("Choice")
 
 
@@ -145,12 +144,9 @@ class Assembly:
         ------
         KinematicsError
             When another part has this name.
-        AssetError
-            When a piece of the solid is empty.
         """
         if name in self._names:
             raise KinematicsError(f"two parts are called {name!r}")
-        _check_filled(name, solid)
         stem, _, number = name.rpartition("_")
         label = label or (stem if number.isdigit() else name)
         self._append(name, solid, joint, label, self.density if density is None else density)
@@ -169,6 +165,22 @@ class Assembly:
 
     def __len__(self) -> int:
         return len(self._names)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Semantic names of the parts, the root's first."""
+        return tuple(self._labels)
+
+    @property
+    def features(self) -> frozenset[str]:
+        """What :meth:`record` noted."""
+        return frozenset(name for name, there in self._features.items() if there)
+
+    def extents(self) -> Array:
+        """(3,) sides of the box of the whole assembly at rest, along X, Y and Z, metres."""
+        bounds = np.array([solid.bounds() for solid in self._solids if solid.pieces])
+        sides: Array = bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)
+        return sides
 
     @property
     def joint_types(self) -> tuple[str, ...]:
@@ -207,6 +219,7 @@ class Assembly:
             if k > first and (joint is None or joint.parent not in turning):
                 continue
             turning.add(self._names[k])
+            _check_filled(self._names[k], self._solids[k])  # pieces that are made, not planned, round in one way only
             self._solids[k] = self._solids[k].turned(hinge.axis, angle, about)
             if k > first and joint is not None:
                 origin = about + apply(rotation, np.asarray(joint.origin) - about)
@@ -219,11 +232,12 @@ class Assembly:
         Raises
         ------
         AssetError
-            When the root is empty.
+            When the root, or a piece of a part, is empty.
         KinematicsError
             When the joints do not form a tree.
         """
-        _check_filled(self._names[0], self._solids[0])
+        for name, solid in zip(self._names, self._solids, strict=True):
+            _check_filled(name, solid)
         whole = [self._part(k) for k in range(len(self._names))]
         bounds = np.stack([part.bounds for part in whole])
         center = 0.5 * (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0))
@@ -240,7 +254,7 @@ class Assembly:
             sha256=content_sha256([repr(tree.to_dict()).encode(), *content]),
             source=f"{category}:{object_id}",
             source_joints={joint.name: (k, 1.0) for k, joint in enumerate(joints) if k > 0},
-            features=tuple(sorted(name for name, there in self._features.items() if there)),
+            features=tuple(sorted(self.features)),
         )
 
     def _part(self, k: int) -> Part:

@@ -7,10 +7,11 @@ Metres, radians; Z is up.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import wraps
 from itertools import pairwise
-from typing import Any, overload
+from typing import Any, TypeVar, overload
 
 import numpy as np
 from manifold3d import Manifold, OpType
@@ -27,24 +28,88 @@ Along = float | tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Solid:
-    """A union of convex pieces."""
+class Mark:
+    """What some pieces of a part are together: its handle, a knob, a pane. Equal marks are one and the same thing."""
 
-    pieces: tuple[Manifold, ...] = ()
-    """Each convex. They may overlap or touch one another."""
+    label: str
+    outward: Array | None = None
+    """(3,) unit: from the part towards who takes hold of it; None where nothing says so."""
+
+
+_Piece = tuple[Manifold, Mark | None]
+
+
+class _Later:
+    """Pieces that are made when they are first asked for: who wants to know how many doors there are needs none."""
+
+    __slots__ = ("_made", "_make")
+
+    def __init__(self, make: Callable[[], Iterable[_Piece]]) -> None:
+        self._make: Callable[[], Iterable[_Piece]] | None = make
+        self._made: tuple[_Piece, ...] = ()
+
+    def pieces(self) -> tuple[_Piece, ...]:
+        if self._make is not None:
+            self._made, self._make = tuple(self._make()), None
+        return self._made
+
+
+class Solid:
+    """A union of convex pieces, which are made when they are first needed.
+
+    Parameters
+    ----------
+    pieces : sequence of Manifold
+        Each convex. They may overlap or touch one another.
+    """
+
+    __slots__ = ("_later",)
+
+    def __init__(self, pieces: Sequence[Manifold] = ()) -> None:
+        later = _Later(lambda: ((piece, None) for piece in pieces))
+        self._later: tuple[_Later, ...] = (later,) if pieces else ()
+
+    @staticmethod
+    def _of(*later: _Later) -> Solid:
+        solid = Solid()
+        solid._later = later
+        return solid
+
+    @staticmethod
+    def made_by(make: Callable[[], Solid]) -> Solid:
+        """The solid that a function makes, once it is needed."""
+        return Solid._of(_Later(lambda: make()._pieces()))
+
+    def _pieces(self) -> list[_Piece]:
+        return [piece for later in self._later for piece in later.pieces()]
+
+    @property
+    def pieces(self) -> tuple[Manifold, ...]:
+        """Each convex."""
+        return tuple(piece for piece, _ in self._pieces())
+
+    @property
+    def marks(self) -> tuple[Mark | None, ...]:
+        """Of each piece."""
+        return tuple(mark for _, mark in self._pieces())
 
     def __add__(self, other: Solid) -> Solid:
-        return Solid(self.pieces + other.pieces)
+        return Solid._of(*self._later, *other._later)
+
+    def called(self, label: str, outward: Vector | None = None) -> Solid:
+        """The same solid as one labelled piece of its part: ``bar.called("handle", FRONT)``; see :class:`Mark`."""
+        mark = Mark(label, None if outward is None else unit(np.array(outward, dtype=np.float64)))
+        return Solid._of(_Later(lambda: ((piece, mark) for piece in self.pieces)))
 
     def moved(self, offset: Vector) -> Solid:
         """Translated by (x, y, z)."""
         x, y, z = (float(v) for v in offset)
-        return Solid(tuple(p.translate((x, y, z)) for p in self.pieces))
+        return Solid._of(_Later(lambda: ((p.translate((x, y, z)), mark) for p, mark in self._pieces())))
 
     def turned(self, axis: Vector, angle: float, about: Vector = (0.0, 0.0, 0.0)) -> Solid:
         """Rotated by ``angle`` radians about an axis through the point ``about``."""
         rotation = rotation_about(axis, angle)
-        point = np.asarray(about, dtype=np.float64)
+        point = np.array(about, dtype=np.float64)
         return self._mapped(rotation, point - apply(rotation, point))
 
     def rotated(self, rotation: Array) -> Solid:
@@ -63,7 +128,16 @@ class Solid:
 
     def _mapped(self, linear: Array, offset: Array) -> Solid:
         matrix = np.column_stack([linear, offset])
-        return Solid(tuple(p.transform(matrix) for p in self.pieces))
+
+        def mapped() -> Iterator[_Piece]:
+            marks: dict[Mark | None, Mark | None] = {None: None}
+            for piece, mark in self._pieces():
+                if mark is not None and mark not in marks:
+                    outward = None if mark.outward is None else unit(apply(linear, mark.outward))
+                    marks[mark] = Mark(mark.label, outward)
+                yield piece.transform(matrix), marks[mark]
+
+        return Solid._of(_Later(mapped))
 
     def bounds(self) -> Array:
         """(2, 3) corners of the axis-aligned box."""
@@ -79,6 +153,29 @@ class Solid:
         return tuple(mesh_of(p) for p in self.pieces)
 
 
+Shape = TypeVar("Shape", bound=Callable[..., Solid])
+
+
+def deferred(shape: Shape) -> Shape:
+    """A function that returns a solid, to be called when the solid's pieces are first needed.
+
+    Its arguments are kept as they are now: arrays are copied, and numbers drawn must be drawn before.
+    """
+
+    @wraps(shape)
+    def later(*given: Any, **options: Any) -> Solid:
+        kept, more = [_kept(value) for value in given], {name: _kept(value) for name, value in options.items()}
+        return Solid.made_by(lambda: shape(*kept, **more))
+
+    return later  # type: ignore[return-value]
+
+
+def _kept(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.copy()
+    return type(value)(_kept(v) for v in value) if type(value) in (list, tuple) else value
+
+
 def mesh_of(manifold: Manifold) -> tuple[Array, NDArray[np.int32]]:
     """Vertices (V, 3) and faces (F, 3) of a manifold."""
     mesh = manifold.to_mesh64()
@@ -88,17 +185,19 @@ def mesh_of(manifold: Manifold) -> tuple[Array, NDArray[np.int32]]:
 
 def union(solids: Iterable[Solid]) -> Solid:
     """All pieces of several solids."""
-    return Solid(tuple(p for solid in solids for p in solid.pieces))
+    return Solid._of(*(later for solid in solids for later in solid._later))
 
 
 # --- convex shapes ---------------------------------------------------------------------------------------------------
 
 
+@deferred
 def hull(points: ArrayLike) -> Solid:
     """Convex hull of (N, 3) points."""
     return Solid((Manifold.hull_points(np.asarray(points, dtype=np.float64)),))
 
 
+@deferred
 def hull_of(*solids: Solid) -> Solid:
     """Convex hull of whole solids."""
     return Solid((Manifold.batch_hull([p for s in solids for p in s.pieces]),))
@@ -112,6 +211,7 @@ def box(
 def box(
     x: Span, y: Span, z: Span, /, *, fillet: float | None = None, axis: int | None = None, steps: int = 3
 ) -> Solid: ...
+@deferred
 def box(*extent: Any, fillet: float | None = None, axis: int | None = None, steps: int = 3) -> Solid:
     """Axis-aligned box between two corners, or by its span along each axis; its edges may be round.
 
@@ -143,6 +243,7 @@ def box(*extent: Any, fillet: float | None = None, axis: int | None = None, step
     return hull((signs[:, None] * (half + radius * corner)).reshape(-1, 3) + 0.5 * (low + high))
 
 
+@deferred
 def prism(outline: ArrayLike, low: float, high: float, axis: int = 2) -> Solid:
     """Convex polygon, extruded along a coordinate axis from ``low`` to ``high``.
 
@@ -159,6 +260,7 @@ def prism(outline: ArrayLike, low: float, high: float, axis: int = 2) -> Solid:
     return hull(points.reshape(-1, 3))
 
 
+@deferred
 def cylinder(start: Vector, end: Vector, radius: float, end_radius: float | None = None, sections: int = 24) -> Solid:
     """Cylinder, cone or frustum between two points."""
     far = radius if end_radius is None else end_radius
@@ -178,6 +280,7 @@ def rod(x: Along, y: Along, z: Along, radius: float, end_radius: float | None = 
     return cylinder(start, end, radius, end_radius, sections)
 
 
+@deferred
 def ellipsoid(center: Vector, radii: Vector | float, sections: int = 16) -> Solid:
     """Ellipsoid with its axes along x, y and z; a sphere when ``radii`` is one number."""
     factors = np.broadcast_to(np.asarray(radii, dtype=np.float64), (3,))
@@ -187,6 +290,7 @@ def ellipsoid(center: Vector, radii: Vector | float, sections: int = 16) -> Soli
 # --- shapes of several pieces ----------------------------------------------------------------------------------------
 
 
+@deferred
 def posts(x: Span, y: Span, z: Span, radius: float, end_radius: float | None = None, sections: int = 14) -> Solid:
     """Four upright cylinders, or cones, on the corners of a rectangle: feet, legs."""
     low, high = ends(z)
@@ -194,6 +298,7 @@ def posts(x: Span, y: Span, z: Span, radius: float, end_radius: float | None = N
     return union(cylinder((*spot, low), (*spot, high), radius, end_radius, sections) for spot in spots)
 
 
+@deferred
 def tube(path: ArrayLike, radius: float | Sequence[float], sections: int = 12, closed: bool = False) -> Solid:
     """Round rod along a polyline.
 
@@ -225,6 +330,7 @@ def _rings(path: Array, radius: float | Sequence[float], sections: int, closed: 
     return rings
 
 
+@deferred
 def loft(rings: Sequence[ArrayLike], closed: bool = False) -> Solid:
     """Hull of each two neighbours in a row of (M, 3) cross-sections."""
     pairs = pairwise([*rings, rings[0]] if closed else rings)
@@ -245,6 +351,7 @@ def ring(
                     center, normal, sections, arc)  # fmt: skip
 
 
+@deferred
 def revolved(
     outline: ArrayLike,
     center: Vector = (0.0, 0.0, 0.0),
@@ -269,6 +376,7 @@ def revolved(
     return loft(slices)
 
 
+@deferred
 def vessel(
     profile: ArrayLike, wall: float, center: Vector = (0.0, 0.0, 0.0), sections: int = 24, floor: bool = True
 ) -> Solid:
@@ -294,6 +402,7 @@ def vessel(
     return sides + cylinder((x, y, z + z0), (x, y, z + z0 + wall), r0, top, sections)
 
 
+@deferred
 def tray(low: Vector, high: Vector, wall: float, floor: float | None = None, axis: int = 2, side: int = 1) -> Solid:
     """Open box: a floor and four walls.
 
@@ -317,6 +426,7 @@ def tray(low: Vector, high: Vector, wall: float, floor: float | None = None, axi
     return box(bottom_low, bottom_high) + frame(wall_low, wall_high, [wall] * 4, opening[0], opening[1])
 
 
+@deferred
 def frame(low: Vector, high: Vector, widths: Sequence[float], first: int = 1, second: int = 2) -> Solid:
     """Box with a rectangular hole through it.
 

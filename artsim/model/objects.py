@@ -19,6 +19,7 @@ from artsim.errors import AssetError, ConfigError, KinematicsError
 from artsim.model.inertia import Inertia
 from artsim.model.joints import LARGEST
 from artsim.model.kinematics import Array, KinematicTree
+from artsim.model.params import Params
 
 if TYPE_CHECKING:
     import trimesh
@@ -162,6 +163,8 @@ class ArticulatedObject(Showable):
         ``multiplier * q[part]``. Screw parts list two file joints.
     features : tuple of str
         What the family of a procedural object records of it besides its parts: "handles", "legs".
+    params : Params, optional
+        What makes a procedural object: :func:`artsim.make` makes it from them again.
     """
 
     object_id: str
@@ -175,6 +178,7 @@ class ArticulatedObject(Showable):
     source: str = ""
     source_joints: Mapping[str, tuple[int, float]] = None  # type: ignore[assignment]  # empty, set below
     features: tuple[str, ...] = ()
+    params: Params | None = None
 
     def __post_init__(self) -> None:
         if self.T_base_rest is None:
