@@ -59,6 +59,7 @@ def _form_problems(sample: Sample, num_parts: int) -> Iterator[str]:
         "joint_state": (np.float64, (K,)), "joint_rest": (np.float64, (K,)), "joint_limits": (np.float64, (K, 2)),
         "K": (np.float64, (3, 3)), "T_world_camera": (np.float64, (4, 4)),
         "depth": (np.float32, image), "part_mask": (np.uint8, image), "rgb": (np.uint8, (*image, 3)),
+        "detail": (np.uint8, (points,)),
     }  # fmt: skip
     if points == 0:
         yield "has no points"
@@ -89,6 +90,11 @@ def _copy_problems(sample: Sample, obj: ArticulatedObject) -> Iterator[str]:
         yield "category or object_id are not those of the object"
     if sample.part_names != tuple(p.label for p in obj.parts):
         yield "part names are not those of the object"
+    if [(d.name, d.label, d.part) for d in sample.details] != [(d.name, d.label, d.part) for d in obj.details] or any(
+        not close(one.T_rest_detail, two.T_rest_detail, length)
+        for one, two in zip(sample.details, obj.details, strict=True)
+    ):
+        yield "details are not those of the object"
     if not close(sample.diagonal, obj.diagonal, length):
         yield "the diagonal is not that of the object"
     if not (close(sample.box_center, obj.box_center, length) and close(sample.box_size, obj.box_size, length)):

@@ -43,6 +43,9 @@ class SampleOptions:
     noise: SensorName = "none"
     """Depth sensor whose noise the cloud and the depth image carry; the ground truth never does."""
 
+    details: bool = False
+    """Say of each point which handle, knob, button, pane or display it is on."""
+
     def __post_init__(self) -> None:
         if not 1 <= self.num_points <= 1_000_000:
             raise ConfigError(f"clouds of {self.num_points} points are not made", "num_points", "use 1 to 1000000")
@@ -75,7 +78,7 @@ def draw_sample(
         try:
             return observe(
                 sized, q, camera, num_points=options.num_points, renderer=renderer, images=options.images,
-                noise=options.noise, rng=rng, seed=seed, index=index,
+                noise=options.noise, rng=rng, seed=seed, index=index, details=options.details,
             )  # fmt: skip
         except RenderError:
             continue  # out of sight: draw another view

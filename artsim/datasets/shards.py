@@ -21,16 +21,18 @@ from artsim.common.array_files import parse_npy
 from artsim.common.files import atomic_file, open_image
 from artsim.datasets.tar_index import read_index
 from artsim.errors import DatasetError
+from artsim.model.details import DetailFrame
 from artsim.observing.sample import Sample
 from artsim.runs.storage import FolderStorage, Storage
 
 _CLOUD = ("points", "part", "npcs")
 _PNG = ("part_mask", "rgb")
+_ON_REQUEST = ("depth", "detail")
 _STRINGS = ("joint_type", "part_names")
 _INTEGERS = ("joint_parent",)
 _SCALARS = ("width", "height", "category", "object_id", "object_sha256", "scale", "diagonal", "seed", "index",
             "renderer", "artsim_version")  # fmt: skip
-_OTHER = (*_CLOUD, *_PNG, "depth", "noise", *_STRINGS, *_SCALARS)
+_OTHER = (*_CLOUD, *_PNG, "depth", "noise", "details", "detail", *_STRINGS, *_SCALARS)
 _ARRAYS = tuple(f.name for f in fields(Sample) if f.name not in _OTHER)
 
 MAX_PIXELS = 8192 * 8192
@@ -46,9 +48,12 @@ def sample_members(sample: Sample) -> dict[str, bytes]:
     record |= {name: np.ascontiguousarray(getattr(sample, name)) for name in _ARRAYS}
     if sample.noise != "none":  # so that samples without noise are what they were before there was any
         record["noise"] = sample.noise
+    if sample.details:
+        record["details"] = [detail.to_dict() for detail in sample.details]
     members["json"] = orjson.dumps(record, option=orjson.OPT_SERIALIZE_NUMPY)  # infinite limits become null
-    if sample.depth is not None:
-        members["depth.npy"] = npy_bytes(sample.depth)
+    for name in _ON_REQUEST:
+        if getattr(sample, name) is not None:
+            members[f"{name}.npy"] = npy_bytes(getattr(sample, name))
     for name in _PNG:
         image = getattr(sample, name)
         if image is not None:
@@ -82,8 +87,8 @@ def sample_from_members(members: Mapping[str, bytes], where: str, fix: str = _AG
         }
         values["joint_limits"] = limits.reshape(-1, 2)
         values |= {name: parse_npy(members[f"{name}.npy"]) for name in _CLOUD}
-        if "depth.npy" in members:
-            values["depth"] = parse_npy(members["depth.npy"])
+        values |= {name: parse_npy(members[f"{name}.npy"]) for name in _ON_REQUEST if f"{name}.npy" in members}
+        values["details"] = tuple(DetailFrame.from_dict(detail) for detail in record.get("details", ()))
         for name in _PNG:
             if f"{name}.png" in members:
                 values[name] = np.asarray(open_image(members[f"{name}.png"], name, DatasetError, MAX_PIXELS))
@@ -108,6 +113,10 @@ def _check(values: Mapping[str, Any]) -> None:
     if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f" or not np.isfinite(points).all():
         raise ValueError("its points are not finite coordinates")
     if values["npcs"].shape != points.shape or part.shape != points.shape[:1] or part.dtype != np.uint8:
+        raise ValueError("its points have labels that do not fit")
+    if any(detail.part >= K for detail in values["details"]):
+        raise ValueError("a detail is of a part that it does not have")
+    if "detail" in values and values["detail"].shape != part.shape:
         raise ValueError("its points have labels that do not fit")
     if K == 0 or len(values["part_names"]) != K or (len(part) and int(part.max()) >= K):
         raise ValueError("its points are of parts that it does not have")

@@ -127,6 +127,8 @@ def describe(robot: Robot, formats: Sequence[str]) -> dict[str, Any]:
             "mass_kg": sum(link.inertia.mass for link in robot.links),
             "size_m": (obj.bounds[1] - obj.bounds[0]).tolist(),
             "sha256": obj.sha256,
+            # Frames of handles, knobs and panes in the rest frame; "part" counts as "parts" does.
+            "details": [detail.to_dict() for detail in obj.details],
         },
     }
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from lxml import etree
+from scipy.spatial.transform import Rotation
 
 from artsim.common.extras import import_mujoco
 from artsim.common.names import unused_name
@@ -37,7 +38,8 @@ def mjcf_text(robot: Robot, options: ExportOptions, finish: Finish = NO_FINISH) 
     """The object as an MJCF document; its meshes lie in ``meshes/``.
 
     Bodies, joints and inertias are those of the URDF file. What follows another joint (``mimic``, screws) is held by an
-    equality constraint. Geoms of group 2 are seen, those of group 3 collide, as MuJoCo's viewers take them.
+    equality constraint. Geoms of group 2 are seen, those of group 3 collide, as MuJoCo's viewers take them. Sites of
+    group 4 are the boxes of handles, knobs and panes, in their frames.
     Actuators have the names of their joints. MuJoCo knows no velocity limits: motors that lose effort with speed keep
     them.
 
@@ -131,6 +133,13 @@ def _add_body(
         _add_geom(body, "visual", link, link.visual)
     for shape in link.collision:
         _add_geom(body, "collision", link, shape)
+    for detail in link.details:
+        T = detail.T_rest_detail
+        x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat().tolist()
+        place = {"pos": numbers(T[:3, 3] - link.origin), "quat": numbers((w, x, y, z))}
+        etree.SubElement(
+            body, "site", name=detail.name, type="box", size=numbers(0.5 * detail.size), group="4", **place
+        )
     return body
 
 

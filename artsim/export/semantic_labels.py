@@ -3,8 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from artsim.model.appearance import Material
-from artsim.model.robot import Robot
+from artsim.model.details import on_faces
+from artsim.model.robot import Link, Robot
 
 OBJECT = "Q488383"
 """The item of Wikidata for any object, for categories without one of their own."""
@@ -25,6 +28,7 @@ CATEGORIES = {
 have that of a broader class."""
 PARTS = {
     "button": "Q870870", "door": "Q36794", "handle": "Q200266", "hinge": "Q244330", "lever": "Q40164",
+    "glass": "Q11469", "knob": "Q200266",
     "lid": "Q2488579", "shelf": "Q45242859", "tray": "Q613972", "wheel": "Q446", "window": "Q35473",
 }  # fmt: skip
 """Items of Wikidata for words of labels of parts."""
@@ -63,8 +67,35 @@ def add_labels(stage: Any, robot: Robot, paths: Sequence[Any], materials: Mappin
             _label(stage.GetPrimAtPath(path), "class", word)
             if (item := part_item(word)) is not None:
                 _label(stage.GetPrimAtPath(path), "wikidata_qcode", item)
+        _label_details(stage, robot, link, path)
     for path, material in materials.items():
         _label(stage.GetPrimAtPath(path), "material", material.substance or UNKNOWN_SUBSTANCE)
+
+
+def _label_details(stage: Any, robot: Robot, link: Link, path: Any) -> None:
+    """Labels of the frames of handles, knobs and panes, and of their faces of what is seen."""
+    from pxr import UsdGeom
+
+    if not link.details:
+        return
+    mesh, part = UsdGeom.Mesh(stage.GetPrimAtPath(path.AppendChild("visual"))), robot.obj.parts[link.part]
+    points, index = np.asarray(mesh.GetPointsAttr().Get(), float), np.asarray(mesh.GetFaceVertexIndicesAttr().Get())
+    middles = points[index.reshape(-1, 3)].mean(axis=1) + link.origin
+    for number, detail in enumerate(link.details):
+        prims = [stage.GetPrimAtPath(path.AppendChild(detail.name))]
+        own = on_faces(middles, part.vertices * robot.obj.scale, part.faces[part.detail_of_face == number], _ON_FACE)
+        if own.any():
+            faces = np.flatnonzero(own).tolist()
+            subset = UsdGeom.Subset.CreateGeomSubset(mesh, detail.name, UsdGeom.Tokens.face, faces, "semantics")
+            prims.append(subset.GetPrim())
+        for prim in prims:
+            _label(prim, "class", detail.label)
+            if (item := part_item(detail.label)) is not None:
+                _label(prim, "wikidata_qcode", item)
+
+
+_ON_FACE = 1e-6
+"""Metres by which the middle of a face, in single precision, may miss the surface that it is of."""
 
 
 def _label(prim: Any, taxonomy: str, word: str) -> None:

@@ -51,7 +51,7 @@ _UPPER = [(i, j, "xyz"[i], "xyz"[j]) for i in range(3) for j in range(i, 3)]
 
 
 def _add_shape(element: etree._Element, tag: str, link: Link, shape: BoxShape | MeshShape) -> None:
-    holder = etree.SubElement(element, tag)
+    holder = etree.SubElement(element, tag, {"name": shape.detail} if shape.detail else {})
     _add_origin(holder, (shape.center if isinstance(shape, BoxShape) else np.zeros(3)) - link.origin)
     geometry = etree.SubElement(holder, "geometry")
     if isinstance(shape, BoxShape):

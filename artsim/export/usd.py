@@ -12,8 +12,14 @@ from artsim.export.looks import NO_FINISH, Finish, Look
 from artsim.export.options import ExportOptions
 from artsim.export.semantic_labels import add_labels
 from artsim.model.appearance import Material
+from artsim.model.details import GRIPS
 from artsim.model.kinematics import Array
 from artsim.model.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
+
+STATIC_FRICTION, SLIDING_FRICTION = 0.5, 0.4
+"""Of every surface: lacquered wood and plastic on rubber and steel have 0.3 to 0.6."""
+APPROACH = 0.06
+"""Metres before a handle at which the line of a gripper's approach begins."""
 
 
 def usd_stage(
@@ -52,6 +58,7 @@ def usd_stage(
     paths = [root.GetPath().AppendChild(link.name) for link in robot.links]
     for link, path in zip(robot.links, paths, strict=True):
         _add_link(stage, path, link)
+    _add_friction(stage, root.GetPath(), robot)
     materials = _add_finish(stage, root.GetPath(), robot, finish, pictures)
     free = options.base == "free"
     UsdPhysics.ArticulationRootAPI.Apply(stage.GetPrimAtPath(paths[0]) if free else root.GetPrim())
@@ -94,6 +101,21 @@ def _add_link(stage: Any, path: Any, link: Link) -> None:
     mass.CreateDiagonalInertiaAttr(Gf.Vec3f(*moments.tolist()))
     mass.CreatePrincipalAxesAttr(_quaternion(axes))
     seen = None if link.visual is None else _add_mesh(stage, path.AppendChild("visual"), link, link.visual)
+    for detail in link.details:
+        frame = UsdGeom.Xform.Define(stage, path.AppendChild(detail.name))
+        T = detail.T_rest_detail.copy()
+        T[:3, 3] -= link.origin
+        frame.AddTransformOp().Set(Gf.Matrix4d(T.T.tolist()))
+        if detail.label in GRIPS:  # in the middle of the handle, from where a gripper comes
+            line = UsdGeom.BasisCurves.Define(stage, path.AppendChild(f"grasp_identifier_{detail.name}"))
+            ends = np.stack([T[:3, 3] + (0.5 * detail.size[0] + APPROACH) * T[:3, 0], T[:3, 3]])
+            line.CreatePointsAttr([tuple(end) for end in ends.tolist()])
+            line.CreateExtentAttr([tuple(ends.min(axis=0).tolist()), tuple(ends.max(axis=0).tolist())])
+            line.CreateCurveVertexCountsAttr([2])
+            line.CreateTypeAttr(UsdGeom.Tokens.linear)
+            line.CreateWidthsAttr([0.002])
+            line.SetWidthsInterpolation(UsdGeom.Tokens.constant)
+            line.CreatePurposeAttr(UsdGeom.Tokens.guide)
     for i, shape in enumerate(link.collision):
         here = path.AppendChild(f"collision_{i}")
         if any(_is_same(shape, other) for other in link.collision[:i]):
@@ -114,6 +136,21 @@ def _add_link(stage: Any, path: Any, link: Link) -> None:
             collider.GetPrim().AddAppliedSchema(schema)
         if collider is not seen:
             collider.CreatePurposeAttr(UsdGeom.Tokens.guide)
+
+
+def _add_friction(stage: Any, root: Any, robot: Robot) -> None:
+    """One physics material for all that collides."""
+    from pxr import UsdPhysics, UsdShade
+
+    path = root.AppendChild(unused_name("surface", {link.name for link in robot.links}))
+    material = UsdShade.Material.Define(stage, path)
+    physics = UsdPhysics.MaterialAPI.Apply(material.GetPrim())
+    physics.CreateStaticFrictionAttr(STATIC_FRICTION)
+    physics.CreateDynamicFrictionAttr(SLIDING_FRICTION)
+    physics.CreateRestitutionAttr(0.0)
+    for prim in stage.Traverse():
+        if prim.HasAPI(UsdPhysics.CollisionAPI):
+            UsdShade.MaterialBindingAPI.Apply(prim).Bind(material, UsdShade.Tokens.weakerThanDescendants, "physics")
 
 
 def _is_same(shape: BoxShape | MeshShape, other: BoxShape | MeshShape) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +31,7 @@ class RigidBody:
     slide: UrdfJoint | None = None  # screws: the prismatic joint merged into this one
     slide_rate: float = 0.0  # screws: value of the slide joint for each radian
     pitch: float = 0.0  # screws: metres along the turning axis for each radian
+    details: dict[str, NDArray[np.int64]] = field(default_factory=dict)  # faces of shapes named as details are
 
     def part(self, labels: Mapping[str, str]) -> Part:
         label = next((labels[link] for link in self.links if link in labels), None)

@@ -22,6 +22,7 @@ from artsim.loading.bodies import (
     without_empty_leaves,
 )
 from artsim.loading.described_bodies import with_described_bodies
+from artsim.loading.details import named_faces, with_details
 from artsim.loading.documents import read_document
 from artsim.loading.mesh_files.surface import is_thin
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, check_range, merge_shapes
@@ -30,7 +31,7 @@ from artsim.loading.packages import MissingFileError
 from artsim.loading.partnet import read_side_files
 from artsim.loading.rest_frame import rest_rotation
 from artsim.loading.rest_state import canonical_category, rest_state
-from artsim.loading.urdf_document import UrdfJoint, UrdfLink, UrdfRobot
+from artsim.loading.urdf_document import Shape, UrdfJoint, UrdfLink, UrdfRobot
 from artsim.model.joints import Joint, Mimic
 from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.object_file import load_object
@@ -112,6 +113,7 @@ def load(
     T_base_part = tree.forward_kinematics(rest)
     tree, parts, T_base_rest, reasons = _to_rest_frame(tree, parts, rest, known)
     T_rest_part = matmul(np.linalg.inv(T_base_rest), T_base_part)
+    parts = with_details(parts, bodies, robot.links, reader, T_rest_part)
     parts = with_described_bodies(parts, bodies, robot, reader, T_rest_part, file)
     repairs += reasons
     repairs += _far_slides(tree, parts, robot.explicit)
@@ -162,11 +164,12 @@ def _read_geometry(
     """Fill in every body's surface from the shapes of its links."""
     links = {link.name: link for link in robot.links}
     for body in bodies:
-        surfaces = []
+        surfaces, names = [], []
         unusable = []
         for name in body.links:
             found, problems = _surfaces(links[name], body.T_base_link[name], reader, file, robot.noun)
-            surfaces += found
+            surfaces += [surface for _, surface in found]
+            names += [shape.name for shape, _ in found]
             unusable += [f"{robot.noun} {name!r}: {problem}" for problem in problems]
             repairs += [Repair(f"{robot.noun} {name!r}", f"{problem}: left out") for problem in problems]
         if unusable and not surfaces:
@@ -174,6 +177,7 @@ def _read_geometry(
                 f"a part has no extent: {unusable[0]}", file, "give it a size above 0, or remove the empty shape"
             )
         body.vertices, body.faces = merge_shapes(surfaces)
+        body.details = named_faces(names, [len(faces) for _, faces, _ in surfaces])
         check_range(body.vertices, f"{file}: {robot.noun} {body.links[0]!r}")
     repairs += reader.notes
     if not any(len(body.faces) for body in bodies):
@@ -182,8 +186,8 @@ def _read_geometry(
 
 def _surfaces(
     link: UrdfLink, T_base_link: Array, reader: MeshReader, file: Path, noun: str
-) -> tuple[list[tuple[Array, NDArray[np.int32], Array]], list[str]]:
-    """Vertices, triangles and transform into the base frame of each shape of a link, and why others are left out.
+) -> tuple[list[tuple[Shape, tuple[Array, NDArray[np.int32], Array]]], list[str]]:
+    """Each shape of a link, its vertices, triangles and transform into the base frame, and why others are left out.
 
     Raises
     ------
@@ -204,7 +208,7 @@ def _surfaces(
             if isinstance(problem.__cause__, MissingFileError):
                 fix = fix or problem.__cause__.fix
             continue
-        surfaces.append((vertices, faces, matmul(T_base_link, shape.origin)))
+        surfaces.append((shape, (vertices, faces, matmul(T_base_link, shape.origin))))
     if problems and not surfaces:
         count = len(problems)
         raise AssetError(

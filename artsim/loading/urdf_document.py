@@ -84,6 +84,8 @@ class Shape:
     geometry: Geometry
     origin: Array
     """(4, 4) float. Maps the geometry's frame to the link's."""
+    name: str = ""
+    """Of its element; PartNet-Mobility's say what is shown: "handle-12"."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,8 @@ class UrdfLink:
     """Why other shapes of it cannot be shown."""
     empty: tuple[str, ...] = ()
     """What shapes of it have no extent, so that there is nothing to show."""
+    details: tuple[Shape, ...] = ()
+    """Collision shapes of URDF that are named as details are."""
     collision: tuple[Shape, ...] = ()
     """What collides; of MJCF and USD alone."""
     inertia: Inertia | None = None

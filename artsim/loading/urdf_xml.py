@@ -16,6 +16,7 @@ from artsim.loading.joint_xml import read_joint
 from artsim.loading.urdf_document import Box, Capsule, Cylinder, Geometry, MeshFile, Shape, Sphere, UrdfLink, UrdfRobot
 from artsim.loading.xml_repair import readable_xml, use_plain_names
 from artsim.loading.xml_values import Element
+from artsim.model.details import label_of_visual
 from artsim.model.objects import Repair
 
 SHAPES = ("box", "cylinder", "capsule", "sphere", "mesh")
@@ -122,7 +123,10 @@ def _read_link(link: etree._Element, shown: str, file: Path, repairs: list[Repai
             continue
         if shape is not None:
             shapes.append(shape)
-    return UrdfLink(str(link.get("name")), tuple(shapes), tuple(unusable), tuple(empty))
+    named = [found for found in link.findall("collision") if label_of_visual(found.get("name") or "") is not None]
+    details = [] if shown == "collision" else [_read_shape(found, element) for found in named]
+    kept = tuple(shape for shape in details if shape is not None)
+    return UrdfLink(str(link.get("name")), tuple(shapes), tuple(unusable), tuple(empty), kept)
 
 
 class UnusableShapeError(Exception):
@@ -148,7 +152,7 @@ def _read_shape(visual: etree._Element, element: Element) -> Shape | None:
         element.say(f"<{visual.tag}> has {len(shapes)} geometries: its first <{kind}> counts")
     if kind not in SHAPES:
         raise UnusableShapeError(f"geometry <{kind}> is not one of {', '.join(SHAPES)}")
-    return Shape(_read_geometry(shape, kind, element), element.origin(visual))
+    return Shape(_read_geometry(shape, kind, element), element.origin(visual), visual.get("name") or "")
 
 
 def _read_geometry(shape: etree._Element, kind: str, element: Element) -> Geometry:

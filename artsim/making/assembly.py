@@ -11,6 +11,7 @@ from artsim.errors import AssetError, KinematicsError
 from artsim.making.draws import Rng as Rng
 from artsim.making.outlines import Vector
 from artsim.making.solids import Solid
+from artsim.model.details import detail_of
 from artsim.model.joints import Joint, Mimic
 from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import ArticulatedObject, Body, Part, content_sha256
@@ -238,7 +239,7 @@ class Assembly:
         """
         for name, solid in zip(self._names, self._solids, strict=True):
             _check_filled(name, solid)
-        whole = [self._part(k) for k in range(len(self._names))]
+        whole = self._parts()
         bounds = np.stack([part.bounds for part in whole])
         center = 0.5 * (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0))
         index = {name: k for k, name in enumerate(self._names)}
@@ -257,10 +258,21 @@ class Assembly:
             features=tuple(sorted(self.features)),
         )
 
-    def _part(self, k: int) -> Part:
-        vertices, faces = self._solids[k].union()
-        body = Body(self._solids[k].piece_meshes(), self._densities[k])
-        return Part(self._names[k], self._labels[k], vertices, faces, body)
+    def _parts(self) -> list[Part]:
+        """In the assembly's frame."""
+        parts = []
+        for name, label, solid, density in zip(self._names, self._labels, self._solids, self._densities, strict=True):
+            vertices, faces = solid.union()
+            pieces, marks = solid.piece_meshes(), solid.marks
+            details = []
+            for mark in dict.fromkeys(mark for mark in marks if mark is not None):
+                own = tuple(piece for piece, its in zip(pieces, marks, strict=True) if its is mark)
+                if len(own) == len(pieces):  # the part itself is the handle, and its label says so
+                    continue
+                points = np.concatenate([corners for corners, _ in own])
+                details.append(detail_of(mark.label, points, vertices, mark.outward, own))
+            parts.append(Part(name, label, vertices, faces, Body(pieces, density), tuple(details)))
+        return parts
 
     def _joint(self, k: int, spec: JointSpec | None, index: dict[str, int], center: Any) -> Joint:
         if spec is None:

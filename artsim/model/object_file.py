@@ -3,6 +3,7 @@
 import io
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from artsim.common.array_files import MAX_ARRAY_BYTES, parse_npz
 from artsim.common.files import parse_json, read_bounded, write_atomic
 from artsim.common.names import printable
 from artsim.errors import AssetError, KinematicsError
+from artsim.model.details import Detail
 from artsim.model.joints import LARGEST
 from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import MAX_PARTS, ArticulatedObject, Part, Repair
@@ -42,6 +44,11 @@ def object_bytes(obj: ArticulatedObject) -> bytes:
         "notes": [[r.where, r.what] for r in obj.repairs if r.note],
         "source_joints": {name: list(v) for name, v in obj.source_joints.items()},
     }
+    arrays: dict[str, Any] = {}
+    if obj.details:
+        header["details"] = [[d.label, k, d.T_rest_detail.tolist(), d.size.tolist()]
+                             for k, p in enumerate(obj.parts) for d in p.details]  # fmt: skip
+        arrays["detail_of_face"] = np.concatenate([p.detail_of_face for p in obj.parts]).astype(np.int16)
     vertices = np.concatenate([p.vertices for p in obj.parts])
     faces = np.concatenate([p.faces for p in obj.parts])
     buffer = io.BytesIO()
@@ -52,6 +59,7 @@ def object_bytes(obj: ArticulatedObject) -> bytes:
         faces=faces,
         vertex_counts=np.array([len(p.vertices) for p in obj.parts]),
         face_counts=np.array([len(p.faces) for p in obj.parts]),
+        **arrays,
     )
     return buffer.getvalue()
 
@@ -106,7 +114,7 @@ def _object(arrays: Mapping[str, NDArray[Any]], source: str) -> ArticulatedObjec
     obj = ArticulatedObject(
         object_id=object_id,
         category=category,
-        parts=_parts(arrays, names, labels),
+        parts=_with_details(_parts(arrays, names, labels), header.get("details", []), arrays),
         native_tree=tree,
         sha256=sha256,
         scale=float(scale),
@@ -149,6 +157,30 @@ def _parts(arrays: Mapping[str, NDArray[Any]], names: Sequence[str], labels: Seq
             raise ValueError(f"a triangle of part {printable(name)} has a corner that does not exist")
         parts.append(Part(name, label, v.astype(np.float64, copy=False), f.astype(np.int32, copy=False)))
     return tuple(parts)
+
+
+def _with_details(parts: tuple[Part, ...], listed: object, arrays: Mapping[str, NDArray[Any]]) -> tuple[Part, ...]:
+    """The parts with the details that the header lists: label, part, frame and size."""
+    if listed == []:
+        return parts
+    owner, count = arrays.get("detail_of_face"), sum(len(part.faces) for part in parts)
+    if not isinstance(listed, list) or owner is None or owner.dtype.kind not in "iu" or owner.shape != (count,):
+        raise ValueError("its details do not fit its faces")
+    ends = np.cumsum([0, *(len(part.faces) for part in parts)])
+    details: list[list[Detail]] = [[] for _ in parts]
+    for entry in listed:
+        if (
+            not isinstance(entry, list)
+            or len(entry) != 5
+            or type(entry[1]) is not int
+            or not 0 <= entry[1] < len(parts)
+        ):
+            raise ValueError(f"a detail is {entry!r:.60}")
+        (label,) = _texts(entry[:1], 1)
+        k, T, size = entry[1], _numbers(entry[2], (4, 4)), _numbers(entry[3], (3,))
+        faces = np.flatnonzero(owner[ends[k] : ends[k + 1]] == len(details[k]))
+        details[k].append(Detail(label, T, size, faces=faces))
+    return tuple(replace(part, details=tuple(own)) for part, own in zip(parts, details, strict=True))
 
 
 def _texts(values: object, count: int) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,6 +17,7 @@ from artsim.common.products import norm
 from artsim.common.showing import Showable
 from artsim.common.tables import brief, centimetres, cut, joint_value, label_of, plural, table, three_digits
 from artsim.errors import AssetError, ConfigError, KinematicsError
+from artsim.model.details import NO_DETAIL, Detail, DetailFrame, detail_of_faces, on_faces
 from artsim.model.inertia import Inertia
 from artsim.model.joints import LARGEST
 from artsim.model.kinematics import Array, KinematicTree
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
 _MAX_REPAIR = 1000
 """Characters of a repair as text: names out of files may be of any length."""
 
+_ON_DETAIL = 3e-6
+"""Diagonals by which a point of a cloud, whose coordinates are of single precision, may miss its surface."""
 MAX_PARTS = 254
 """Part ids are stored in a byte; 255 marks the background."""
 
@@ -99,6 +103,8 @@ class Part:
     """(F, 3) int32. Triangles; empty for a part without geometry."""
     body: Body | None = None
     """Where the source knows it: procedural objects do."""
+    details: tuple[Detail, ...] = ()
+    """Labelled pieces of its surface."""
 
     __repr__ = brief
 
@@ -132,7 +138,13 @@ class Part:
             solid = None if body.solid is None else (body.solid[0] + offset, body.solid[1])
             inertia = body.inertia and replace(body.inertia, center=body.inertia.center + offset)
             body = replace(body, pieces=pieces, solid=solid, inertia=inertia)
-        return replace(self, vertices=self.vertices + offset, body=body)
+        details = tuple(detail.moved(offset) for detail in self.details)
+        return replace(self, vertices=self.vertices + offset, body=body, details=details)
+
+    @cached_property
+    def detail_of_face(self) -> NDArray[np.int64]:
+        """(F,) which of ``details`` each face belongs to; -1 for none."""
+        return detail_of_faces(self.vertices, self.faces, self.details)
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,6 +275,41 @@ class ArticulatedObject(Showable):
     def diagonal(self) -> float:
         """Diagonal of the box of the whole object in its rest state, metres."""
         return float(norm(self.bounds[1] - self.bounds[0]))
+
+    @cached_property
+    def details(self) -> tuple[DetailFrame, ...]:
+        """Handles, knobs, panes and other labelled pieces of the parts, in their order."""
+        found, counts = [], Counter[str]()
+        for k, part in enumerate(self.parts):
+            for detail in part.details:
+                counts[detail.label] += 1
+                T = detail.T_rest_detail.copy()
+                T[:3, 3] *= self.scale
+                found.append(
+                    DetailFrame(f"{detail.label}_{counts[detail.label]}", detail.label, k, T, detail.size * self.scale)
+                )
+        return tuple(found)
+
+    def detail_of_points(self, points: Array, part: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """(N,) which of ``details`` points of the surface belong to: its number, or 255.
+
+        Parameters
+        ----------
+        points : (N, 3) float
+            Rest frame, at rest, metres.
+        part : (N,) uint8
+            Part of each.
+        """
+        found = np.full(len(points), NO_DETAIL, dtype=np.uint8)
+        first = 0
+        for k, of in enumerate(self.parts):
+            own = np.flatnonzero(part == k) if of.details else np.zeros(0, dtype=np.int64)
+            for number in range(len(of.details) if len(own) else 0):
+                faces = of.faces[of.detail_of_face == number]
+                there = on_faces(points[own] / self.scale, of.vertices, faces, _ON_DETAIL * self.diagonal / self.scale)
+                found[own[there]] = min(first + number, NO_DETAIL)
+            first += len(of.details)
+        return found
 
     @property
     def num_faces(self) -> int:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from artsim.common.names import safe_name, unused_name
 from artsim.errors import AssetError
+from artsim.model.details import DetailFrame
 from artsim.model.inertia import Inertia, combine_inertias
 from artsim.model.joints import Joint
 from artsim.model.kinematics import Array
@@ -41,6 +42,8 @@ class BoxShape:
 
     center: Array
     size: Array
+    detail: str = ""
+    """Name of the handle, knob or other labelled piece that it is of."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +53,8 @@ class MeshShape:
     name: str
     vertices: Array
     faces: NDArray[np.int32]
+    detail: str = ""
+    """As of a box."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +70,8 @@ class Link:
     visual: MeshShape | None = None
     collision: tuple[BoxShape | MeshShape, ...] = ()
     """Each convex."""
+    details: tuple[DetailFrame, ...] = ()
+    """Its handles, knobs, panes and other labelled pieces."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,25 +188,31 @@ def _carries(parents: Sequence[int] | NDArray[np.int64], k: int, j: int) -> bool
 def _link(obj: ArticulatedObject, k: int, origin: Array, inertia: Inertia) -> Link:
     part = obj.parts[k]
     pieces = () if part.body is None else part.body.pieces
+    details = tuple(detail for detail in obj.details if detail.part == k)
+    owner = {v.tobytes(): its.name for own, its in zip(part.details, details, strict=True) for v, _ in own.pieces}
     return Link(
         part.name,
         k,
         origin,
         inertia,
         MeshShape(part.name, part.vertices * obj.scale, part.faces) if len(part.faces) else None,
-        tuple(_convex(f"{part.name}-hull{i}", piece, obj.scale) for i, piece in enumerate(pieces)),
+        tuple(
+            _convex(f"{part.name}-hull{i}", piece, obj.scale, owner.get(piece[0].tobytes(), ""))
+            for i, piece in enumerate(pieces)
+        ),
+        details,
     )
 
 
-def _convex(name: str, piece: Mesh, scale: float) -> BoxShape | MeshShape:
+def _convex(name: str, piece: Mesh, scale: float, detail: str) -> BoxShape | MeshShape:
     """A box where the piece is one, else its mesh."""
     vertices, faces = piece[0] * scale, piece[1]
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     near = np.minimum(np.abs(vertices - low), np.abs(vertices - high)).max()
     corners = np.unique(np.abs(vertices - low) < np.abs(vertices - high), axis=0)
     if len(vertices) == len(corners) == 8 and near < 1e-12:
-        return BoxShape(0.5 * (low + high), high - low)
-    return MeshShape(name, vertices, faces)
+        return BoxShape(0.5 * (low + high), high - low, detail)
+    return MeshShape(name, vertices, faces, detail)
 
 
 def _joint(obj: ArticulatedObject, k: int, parent: int, child: int, carried: Inertia) -> LinkJoint:

@@ -32,6 +32,7 @@ def observe(
     rng: np.random.Generator | None = None,
     seed: int = -1,
     index: int = -1,
+    details: bool = False,
 ) -> Sample:
     """Look at a posed object and write down the cloud with its ground truth.
 
@@ -59,6 +60,8 @@ def observe(
         Seeded with 0 by default.
     seed, index : int
         Stored in the record.
+    details : bool
+        Say of each point which handle, knob or pane it is on.
 
     Returns
     -------
@@ -106,7 +109,7 @@ def observe(
         )
     tree = obj.tree
     axis_camera, origin_camera = tree.posed_joints(posed.T_camera_part)
-    return Sample(
+    sample = Sample(
         points=points,
         part=part,
         npcs=npcs,
@@ -138,8 +141,10 @@ def observe(
         renderer=name,
         artsim_version=ARTSIM_VERSION,
         noise=sensor.name,
+        details=obj.details,
         **{image: value if image in images else None for image, value in wanted.items()},
     )
+    return replace(sample, detail=obj.detail_of_points(sample.rest_points, part)) if details else sample
 
 
 _FRAME_FIELDS = {"depth": "depth", "part_mask": "part_ids", "rgb": "rgb"}

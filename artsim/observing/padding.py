@@ -50,7 +50,9 @@ def pad_sample(sample: Sample, max_parts: int, float32: bool = False) -> dict[st
     arrays["part_valid"] = np.arange(max_parts) < num_parts
     arrays |= {name: getattr(sample, name) for name in ("points", "part", "npcs", "K", "T_world_camera")}
     arrays |= {name: np.asarray(getattr(sample, name)) for name in ("scale", "diagonal", "index", "width", "height")}
-    arrays |= {name: image for name in ("depth", "part_mask", "rgb") if (image := getattr(sample, name)) is not None}
+    arrays |= {
+        name: image for name in ("depth", "part_mask", "rgb", "detail") if (image := getattr(sample, name)) is not None
+    }
     return {name: _writable(array, float32) for name, array in arrays.items()}
 
 

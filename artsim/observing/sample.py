@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artsim.common.outputs import write_output
-from artsim.common.products import norm
+from artsim.common.products import matmul, norm
 from artsim.common.showing import Showable
 from artsim.common.tables import centimetres, cut, joint_value, label_of, plural, table, three_digits
+from artsim.model.details import DetailFrame
 from artsim.model.kinematics import Array
 from artsim.model.ply import cloud_ply
 
@@ -71,6 +72,10 @@ class Sample(Showable):
     part_mask : (H, W) uint8 or None
         Part ids without noise, 255 = background.
     rgb : (H, W, 3) uint8 or None
+    details : tuple of DetailFrame
+        Handles, knobs, panes and other labelled pieces of the parts, each with a frame.
+    detail : (N,) uint8 or None
+        Number in ``details`` of the piece that each point's ray truly meets; 255 for none.
     """
 
     points: NDArray[np.float32]
@@ -107,6 +112,8 @@ class Sample(Showable):
     depth: NDArray[np.float32] | None = None
     part_mask: NDArray[np.uint8] | None = None
     rgb: NDArray[np.uint8] | None = None
+    details: tuple[DetailFrame, ...] = ()
+    detail: NDArray[np.uint8] | None = None
 
     def __str__(self) -> str:
         rows: list[tuple[str, ...]] = [
@@ -157,6 +164,12 @@ class Sample(Showable):
         """
         write_output(Path(path), cloud_ply(self.points, self.part))
         return Path(path)
+
+    @property
+    def T_camera_detail(self) -> Array:
+        """(D, 4, 4) frames of ``details`` as posed, in the camera frame."""
+        frames = [matmul(self.T_camera_part[detail.part], detail.T_rest_detail) for detail in self.details]
+        return np.array(frames).reshape(-1, 4, 4)
 
     @property
     def rest_points(self) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 from manifold3d import Manifold
 from numpy.typing import NDArray
 
+from artsim.model.details import detail_of
 from artsim.model.joints import Joint, Mimic
 from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import UNKNOWN_DYNAMICS, ArticulatedObject, Body, Mesh, Part
@@ -189,7 +190,17 @@ def _mapped(part: Part, surface: Callable[[Mesh], Mesh], pieces: Callable[[Body]
     body = part.body
     if body is not None:  # what the file said of the physics was that of another shape
         body = replace(body, pieces=tuple(pieces(body)), inertia=None, joint=UNKNOWN_DYNAMICS)
-    return replace(part, vertices=vertices, faces=faces, body=body)
+    details = []
+    for detail in part.details:
+        own, kept = tuple(pieces(Body(detail.pieces, 0.0))), detail.faces
+        if kept is not None:
+            moved = surface((part.vertices, part.faces[kept]))
+            own_points = moved[0][moved[1]].reshape(-1, 3)
+            kept = kept if len(faces) == len(part.faces) else np.zeros(0, dtype=np.int64)
+        points = own_points if kept is not None else np.concatenate([corners for corners, _ in own])
+        outward = detail.T_rest_detail[:3, 0]
+        details.append(detail_of(detail.label, points, vertices, outward, own, kept))
+    return replace(part, vertices=vertices, faces=faces, body=body, details=tuple(details))
 
 
 def _volume(vertices: Array, faces: NDArray[np.int32]) -> float:
