@@ -82,8 +82,8 @@ class Draws:
         """The same draws for a piece of the object, whose names begin with its own: ``door_width``."""
         return self._child(self._rng, name)
 
-    def fork(self, name: str, seed: int | Sequence[int]) -> Draws:
-        """Draws of a piece from a generator of its own: equal seeds make equal pieces."""
+    def fork(self, name: str, seed: int | Sequence[int] | Rng) -> Draws:
+        """Draws of a piece from a generator of its own, which is given or made: equal seeds make equal pieces."""
         return self._child(np.random.default_rng(seed), name)
 
     def _child(self, rng: Rng, name: str) -> Draws:
@@ -156,9 +156,9 @@ class Draws:
                 value = low + (value - least) % (high - low + 1)
         return int(self._keep(key, Draw(value, "integer", least, most)))
 
-    def chance(self, name: str, share: float) -> bool:
-        """True with the chance ``share``."""
-        value = bool(self._rng.random() < share)
+    def chance(self, name: str, share: float, *, upper: bool = False) -> bool:
+        """True with the chance ``share``: if a flat number between 0 and 1 is below it, or, ``upper``, above the rest."""
+        value = bool(self._rng.random() >= 1.0 - share if upper else self._rng.random() < share)
         key, wanted = self._asked(name)
         draw = Draw(value, "yes or no", high=share)
         asked = _yes_or_no(wanted)
