@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from artsim.common.elementary import exp
 from artsim.model.kinematics import Array
 from artsim.model.params import Value
 
@@ -126,6 +127,11 @@ class Draws:
     def degrees(self, name: str, usual: Interval, widest: Interval | None = None, *, tails: float = 0.25) -> float:
         """A :meth:`number` of degrees."""
         return self.number(name, usual, widest, tails=tails, unit="deg")
+
+    def log_length(self, name: str, middle: float, low: float, high: float) -> float:
+        """Metres whose logarithm is drawn evenly: from ``middle * exp(low)`` to ``middle * exp(high)``."""
+        value = middle * exp(self._rng.uniform(low, high))
+        return self._number(name, value, (middle * exp(low), middle * exp(high)), "m")
 
     def numbers(self, name: str, low: Any, high: Any, count: int | None = None, *, unit: str = "") -> Array:
         """(N,) numbers between ``low`` and ``high``, each of which may be an array; named ``name``, ``name_2``."""
