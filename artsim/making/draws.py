@@ -193,6 +193,10 @@ class Draws:
         self._keep(key, Draw(_text(chosen), "choice", options=names))
         return chosen
 
+    def side(self, name: str) -> float:
+        """1.0 for the left or -1.0 for the right of someone who looks at the front: a sign of Y."""
+        return 1.0 if self.pick(name, ["right", "left"]) == "left" else -1.0
+
     def seed(self, name: str) -> int:
         """A seed for :meth:`fork`."""
         value = int(self._rng.integers(_SEEDS))
