@@ -11,8 +11,10 @@ import numpy as np
 
 from artsim.common.elementary import arcsin, arctan2, cos, hypot, sin
 from artsim.common.products import dot, matmul, norm
-from artsim.making.assembly import Assembly, Rng, pick, revolute
-from artsim.making.solids import Solid, ellipsoid, hull, hull_of, loft, prism, rod, tube, union
+from artsim.making.assembly import Assembly, revolute
+from artsim.making.draws import Draws
+from artsim.making.outlines import strips
+from artsim.making.solids import Solid, deferred, ellipsoid, hull, hull_of, loft, prism, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
@@ -23,16 +25,17 @@ _POINTS_TO_Y = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 class Ring:
     """A finger ring at the +Y side, clear of the middle by its bar; the second of two unlike ones is long."""
 
-    def __init__(self, rng: Rng, reach: float, bar: float, kind: str, second: bool, plastic: bool) -> None:
+    def __init__(self, draws: Draws, reach: float, bar: float, kind: str, second: bool, plastic: bool) -> None:
         long = kind != "same" and second
-        along = reach * (rng.uniform(0.27, 0.35) if long else rng.uniform(0.17, 0.27)) * (1.1 if plastic else 1.0)
-        across = min(along, reach * rng.uniform(0.13, 0.2)) if long or rng.random() < 0.5 else along * 0.95
+        along = reach * draws.number("length", (0.27, 0.35) if long else (0.17, 0.27)) * (1.1 if plastic else 1.0)
+        oval = long or draws.chance("oval", 0.5)
+        across = min(along, reach * draws.number("width", (0.13, 0.2))) if oval else along * 0.95
         self.radii = np.array([along, across])  # of its middle line, along and across
-        self.turn = rng.uniform(0.0, 0.3)  # angle of its long axis from X
-        self.egg = rng.uniform(0.0, 0.35)  # by how much it is wider at the back than at the front
+        self.turn = draws.angle("turn", (0.0, 0.3))  # of its long axis from X
+        self.egg = draws.number("egg", (0.0, 0.35))  # by how much it is wider at the back than at the front
         half = hypot(along * sin(self.turn), (1 + self.egg) * across * cos(self.turn)) + 0.6 * bar
-        y = half + GAP + reach * rng.uniform(0.0, 0.05)
-        shift = reach * rng.uniform(0.05, 0.12) if kind == "offset" and not second else 0.0
+        y = half + GAP + reach * draws.number("spacing", (0.0, 0.05))
+        shift = reach * draws.number("offset", (0.05, 0.12)) if kind == "offset" and not second else 0.0
         self.center = np.array([reach - along - bar - shift, y])
 
     def loop(self) -> Array:
@@ -44,26 +47,27 @@ class Ring:
         return self.center + matmul(u, [[c, s], [-s, c]])
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """Scissors, closed at rest. One blade turns about the vertical pivot."""
-    length = rng.uniform(0.09, 0.3)
-    blade = length * rng.uniform(0.36, 0.6)
-    width = min(max(blade * rng.uniform(0.09, 0.19), 0.006), 0.024)
-    sheet = max(length * rng.uniform(0.008, 0.013), 0.0016)
-    plastic = rng.random() < 0.6
-    bar = length * (rng.uniform(0.026, 0.046) if plastic else rng.uniform(0.014, 0.024))
-    height = bar * rng.uniform(0.8, 1.3) if plastic else max(bar, 2.6 * sheet)
+    length = draws.length("length", (0.09, 0.3))
+    blade = length * draws.number("blade_length", (0.36, 0.6))
+    width = min(max(blade * draws.number("blade_width", (0.09, 0.19)), 0.006), 0.024)
+    sheet = max(length * draws.number("blade_thickness", (0.008, 0.013)), 0.0016)
+    plastic = draws.chance("plastic", 0.6)
+    bar = length * draws.number("bar_width", (0.026, 0.046) if plastic else (0.014, 0.024))
+    height = bar * draws.number("bar_height", (0.8, 1.3)) if plastic else max(bar, 2.6 * sheet)
     reach = length - blade
-    kind = pick(rng, {"same": 0.4, "long": 0.4, "offset": 0.2})
-    rings = [Ring(rng, reach, bar, kind, second, plastic) for second in (False, True)]
+    kind = draws.pick("rings", {"same": 0.4, "long": 0.4, "offset": 0.2})
+    rings = [Ring(draws.within("ring"), reach, bar, kind, second, plastic) for second in (False, True)]
     if kind == "same":
         rings[1] = rings[0]
-    point = _blade(rng, blade, width)
-    rest = rng.uniform(0.15, 0.3) * reach if not plastic and rng.random() < 0.3 else 0.0
-    pivot = width * rng.uniform(0.22, 0.38)
-    button = sheet * rng.uniform(0.4, 1.0)
+    point = _blade(draws, blade, width)
+    rests = not plastic and draws.chance("finger_rest", 0.3)
+    rest = draws.number("finger_rest_length", (0.15, 0.3)) * reach if rests else 0.0
+    pivot = width * draws.number("pivot_radius", (0.22, 0.38))
+    button = sheet * draws.number("pivot_height", (0.4, 1.0))
 
-    opening = np.deg2rad(rng.uniform(45.0, 100.0))
+    opening = np.deg2rad(draws.degrees("blade_angle", (45.0, 100.0)))
     middle = sheet + GAP / 2
     blades = []
     for k in range(2):
@@ -73,10 +77,10 @@ def build(rng: Rng) -> Assembly:
         solid = union(prism(piece * (1.0, side), low, low + sheet) for piece in point)
         handle = _handle(rings[k], side, low, sheet, width, bar, height, plastic)
         opening = min(opening, _clear_opening(handle, low, low + sheet, width))
-        solid += handle
-        if k == 0 and rest > 0:
+        solid += handle.called("handle", (1, 0, 0))
+        if k == 0 and rests:
             solid += _finger_rest(rings[k], rest, bar, middle)
-        outward = 1 if k else -1
+        outward = -side
         face = low + sheet if k else low
         solid += rod(0, 0, (face - 0.5 * outward * sheet, face + outward * button), pivot, 0.85 * pivot, 20)
         blades.append(solid.rotated(_POINTS_TO_Y))
@@ -87,26 +91,25 @@ def build(rng: Rng) -> Assembly:
     return scissors
 
 
-def _blade(rng: Rng, length: float, width: float) -> tuple[Array, ...]:
+def _blade(draws: Draws, length: float, width: float) -> list[Array]:
     """Convex outlines of the blade whose handle is at +Y: the edge just beyond the middle, the back at -Y."""
     edge, back = 0.2 * width, -0.8 * width
-    kind = pick(rng, ["straight", "bellied", "blunt", "narrow"])
+    kind = draws.pick("blade_shape", ["straight", "bellied", "blunt", "narrow"])
+    blunt = kind == "blunt"
     tip = {"blunt": 0.55, "narrow": 0.05}.get(kind, 0.14) * width
-    turn = rng.uniform(0.3, 0.6) if kind != "blunt" else rng.uniform(0.75, 0.9)
+    turn = draws.number("blade_taper", (0.75, 0.9) if blunt else (0.3, 0.6))
     sag = {"bellied": 0.7, "straight": 0.2, "narrow": 0.0}.get(kind, 0.5)
     x = np.linspace(0.0, 1.0, 9)
     falling = np.clip((x - turn) / (1 - turn), 0, 1)
     backs = back + (edge - tip - back) * ((1 - sag) * falling + sag * np.square(falling))
     backs[0] = 0.8 * back
-    if kind == "blunt":
-        backs[-1] = edge - 0.3 * width
-    upper = np.column_stack([-x * length, np.full(9, edge)])
-    lower = np.column_stack([-x * length, backs])
-    if kind == "blunt":
-        upper[-1, 1] = edge - 0.1 * width
-    return tuple(np.concatenate([upper[k : k + 2], lower[k : k + 2]]) for k in range(8))
+    edges = np.full(9, edge)
+    if blunt:
+        backs[-1], edges[-1] = edge - 0.3 * width, edge - 0.1 * width
+    return strips(np.column_stack([-x * length, edges]), np.column_stack([-x * length, backs]))
 
 
+@deferred
 def _handle(
     ring: Ring, side: float, low: float, sheet: float, width: float, bar: float, height: float, plastic: bool
 ) -> Solid:
@@ -157,6 +160,7 @@ def _sections(path: Array, width: float, height: float) -> list[Array]:
     return sections
 
 
+@deferred
 def _finger_rest(ring: Ring, length: float, bar: float, middle: float) -> Solid:
     """Curved hook behind the ring, as hairdressers' scissors have it."""
     loop = ring.loop()

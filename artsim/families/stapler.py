@@ -8,11 +8,10 @@ cheeks at the hinge, a rubber pad, and how far each opens.
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, Rng, pick, revolute
-from artsim.making.outlines import rounded_rectangle
+from artsim.making.assembly import Assembly, revolute
+from artsim.making.draws import Draws
+from artsim.making.outlines import about, ends, rounded_rectangle
 from artsim.making.solids import Solid, box, hull_of, loft, prism, rod
-from artsim.model.kinematics import Array
 
 GAP = 0.0008
 SKIRT = 0.0016
@@ -22,40 +21,41 @@ SKIRT = 0.0016
 class Layout:
     """Measures in metres. The hinge lies at x = 0, the front at x = -length."""
 
-    def __init__(self, rng: Rng) -> None:
-        self.length = rng.uniform(0.065, 0.25)  # from the hinge to the front of the arm
-        self.width = rng.uniform(0.009, 0.018)  # of the magazine
-        self.base = rng.uniform(0.004, 0.011) if rng.random() < 0.75 else self.length * rng.uniform(0.06, 0.16)
-        self.tail = rng.uniform(0.0065, 0.01)  # radius of what turns about the hinge
-        self.hinge = self.base + self.tail + rng.uniform(0.001, 0.004)  # height of the hinge
-        self.magazine = self.hinge + rng.uniform(0.3, 0.6) * self.tail  # height of the magazine's top
+    def __init__(self, draws: Draws) -> None:
+        self.length = draws.length("length", (0.065, 0.25))  # from the hinge to the front of the arm
+        self.width = draws.length("magazine_width", (0.009, 0.018))
+        if draws.chance("low_base", 0.75):
+            self.base = draws.length("base_height", (0.004, 0.011))
+        else:
+            self.base = self.length * draws.number("high_base", (0.06, 0.16))
+        self.tail = draws.length("hinge_radius", (0.0065, 0.01))  # of what turns about the hinge
+        self.hinge = self.base + self.tail + draws.length("hinge_height", (0.001, 0.004))
+        self.magazine = self.hinge + draws.number("magazine_height", (0.3, 0.6)) * self.tail  # of its top
         self.inside = 0.5 * self.width + SKIRT + 2 * GAP  # from the middle to a cheek beside the hinge
-        self.run = rng.uniform(1.2, 2.5) * self.tail  # by how far the cheeks reach forward
-        kind = rng.random()
-        if kind < 0.45:  # the base hardly reaches behind the hinge
-            self.back = self.tail * rng.uniform(0.5, 0.8)
-        else:  # or a little, or as a long plate
-            self.back = self.tail * rng.uniform(1.0, 2.2) if kind < 0.8 else self.length * rng.uniform(0.1, 1.1)
+        self.run = draws.number("cheek_reach", (1.2, 2.5)) * self.tail  # by how far the cheeks reach forward
+        kind = draws.pick("base_tail", {"none": 0.45, "short": 0.35, "long": 0.2})  # what is behind the hinge
+        behind = {"none": (0.5, 0.8), "short": (1.0, 2.2), "long": (0.1, 1.1)}[kind]
+        self.back = draws.number("base_tail_length", behind) * (self.length if kind == "long" else self.tail)
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """A stapler, closed at rest; what turns about the hinge opens upwards."""
-    lay = Layout(rng)
-    length, width = lay.length, lay.width
-    arm_width = max(width * rng.uniform(1.25, 2.6), 2 * lay.inside)
-    if rng.random() < 0.15:  # short and wide, like those for a schoolbag
-        arm_width = min(arm_width * rng.uniform(1.4, 2.1), 0.5 * length)
-    stapler = Assembly("base", _base(rng, lay, arm_width), 2500.0)
-    magazine, arm = _magazine(rng, lay), _arm(rng, lay, arm_width)
+    lay = Layout(draws)
+    length = lay.length
+    arm_width = max(lay.width * draws.number("arm_width", (1.25, 2.6)), 2 * lay.inside)
+    if draws.chance("mini", 0.15):  # short and wide, like those for a schoolbag
+        arm_width = min(arm_width * draws.number("mini_width", (1.4, 2.1)), 0.5 * length)
+    stapler = Assembly("base", _base(draws.within("base"), lay, arm_width), 2500.0)
+    magazine, arm = _magazine(draws.within("magazine"), lay), _arm(draws.within("arm"), lay, arm_width)
     widest = _opening(arm, lay)
-    wide = min(np.deg2rad(with_tails(rng, (80, 125), (80, 206), 0.45)), widest)
+    wide = min(np.deg2rad(draws.degrees("arm_angle", (80, 125), (80, 206), tails=0.45)), widest)
     axis, origin = (0, 1, 0), (0, 0, lay.hinge)
-    if rng.random() < 0.55:
-        lift = min(np.deg2rad(rng.uniform(12, 50)), 0.5 * wide)
+    if draws.chance("magazine", 0.55):
+        lift = min(np.deg2rad(draws.degrees("magazine_angle", (12, 50))), 0.5 * wide)
         stapler.add("magazine", magazine, revolute("base", axis, origin, 0.0, lift), density=3500.0)
         stapler.add("arm", arm, revolute("magazine", axis, origin, 0.0, wide - lift), density=2000.0)
     else:
-        joined = box((-0.9 * length, 0), 0.3 * width, (lay.magazine - 0.001, lay.magazine + 0.002))
+        joined = box((-0.9 * length, 0), 0.3 * lay.width, (lay.magazine - 0.001, lay.magazine + 0.002))
         stapler.add("arm", magazine + joined + arm, revolute("base", axis, origin, 0.0, wide))
     return stapler
 
@@ -73,82 +73,75 @@ def _opening(solid: Solid, lay: Layout) -> float:
     return float(angles[np.argmax(low) - 1]) if low.any() else float(angles[-1])
 
 
-def _base(rng: Rng, lay: Layout, arm_width: float) -> Solid:
+def _base(draws: Draws, lay: Layout, arm_width: float) -> Solid:
     """Plate with an anvil at the front and cheeks beside the hinge."""
-    front = -lay.length - rng.uniform(0.0, 0.012)
-    back = lay.back
-    cheek = rng.uniform(0.0015, 0.003)
+    front, back = -lay.length - draws.length("reach", (0.0, 0.012)), lay.back
+    cheek = draws.length("cheek", (0.0015, 0.003))
     inside, run = lay.inside, lay.run
-    half = max(0.5 * arm_width * rng.uniform(0.95, 1.35), inside + cheek + 0.001)
-    kind = pick(rng, {"plain": 0.5, "boat": 0.3, "round": 0.2})
+    half = max(0.5 * arm_width * draws.number("width", (0.95, 1.35)), inside + cheek + 0.001)
+    kind = draws.pick("shape", {"plain": 0.5, "boat": 0.3, "round": 0.2})
     if kind == "round":
-        half = max(half, min(half * rng.uniform(1.3, 1.9), 0.3 * (back - front)))
-        ends = [rod(x, 0, (0, 0.6 * lay.base), half, 0.94 * half, 32) for x in (front + half, back - half)]
-        solid = hull_of(*ends) + box(
-            (front + 0.4 * half, back), 0.5 * arm_width, (0.001, lay.base), fillet=0.003, axis=2
-        )
+        half = max(half, min(half * draws.number("round_width", (1.3, 1.9)), 0.3 * (back - front)))
+        solid = hull_of(*(rod(x, 0, (0, 0.6 * lay.base), half, 0.94 * half, 32) for x in (front + half, back - half)))
+        solid += box((front + 0.4 * half, back), 0.5 * arm_width, (0.001, lay.base), fillet=0.003, axis=2)
     else:
-        outline = rounded_rectangle((front, -half), (back, half), rng.uniform(0.1, 0.9) * half, 5)
-        inner = outline * (1.0, rng.uniform(0.8, 0.97))
+        outline = rounded_rectangle((front, -half), (back, half), draws.number("rounding", (0.1, 0.9)) * half, 5)
+        inner = outline * (1.0, draws.number("slope", (0.8, 0.97)))
         solid = hull_of(prism(outline, 0, 0.6 * lay.base), prism(inner, 0.5 * lay.base, lay.base))
         if kind == "boat":  # a rounded rear block
             solid += box((-0.3 * lay.length, back), 0.9 * half, (0.001, lay.base), fillet=0.002)
     anvil = -lay.length + 0.012
-    solid += box((anvil - 0.006, anvil + 0.006), 0.0065, (lay.base - 0.002, lay.base + 0.0005))
-    if rng.random() < 0.5:
-        step = rng.uniform(0.15, 0.3) * lay.length
+    solid += box(about(anvil, 0.006), 0.0065, (lay.base - 0.002, lay.base + 0.0005))
+    if draws.chance("rib", 0.5):
+        step = draws.number("rib_end", (0.15, 0.3)) * lay.length
         solid += box((anvil + 0.012, -step), 0.4 * inside, (lay.base - 0.002, lay.base + 0.0006), fillet=0.001, axis=2)
-    rise = lay.hinge + rng.uniform(0.3, 0.6) * lay.tail
+    rise = lay.hinge + draws.number("cheek_height", (0.3, 0.6)) * lay.tail
+    foot = [(-run, lay.base - 0.002), (min(0.95 * lay.tail, 0.98 * back), lay.base - 0.002)]
+    crown = [(-0.5 * lay.tail, rise), (0.4 * lay.tail, rise), (min(0.9 * lay.tail, 0.98 * back), lay.hinge)]
     for side in (-1, 1):
-        y = sorted((side * inside, side * (inside + cheek)))
-        foot = [(-run, lay.base - 0.002), (min(0.95 * lay.tail, 0.98 * back), lay.base - 0.002)]
-        crown = [(-0.5 * lay.tail, rise), (0.4 * lay.tail, rise), (min(0.9 * lay.tail, 0.98 * back), lay.hinge)]
-        solid += prism(foot + crown, y[0], y[1], axis=1)
         head = side * (inside + cheek)
+        solid += prism(foot + crown, *ends((side * inside, head)), axis=1)
         solid += rod(0, (head - side * 0.001, head + side * 0.0008), lay.hinge, 0.3 * lay.tail)
-    if rng.random() < 0.4:
+    if draws.chance("pad", 0.4):
         solid += box((front + 0.008, back - 0.006), 0.8 * half, (-0.0015, 0.001), fillet=0.003, axis=2)
     return solid
 
 
-def _magazine(rng: Rng, lay: Layout) -> Solid:
+def _magazine(draws: Draws, lay: Layout) -> Solid:
     """Channel of the staples: a long box that ends in a round tongue at the hinge."""
     half = 0.5 * lay.width
-    low = lay.base + rng.uniform(0.0025, 0.005)
-    high = lay.magazine
-    start = -lay.length + rng.uniform(0.0, 0.004)
+    low, high = lay.base + draws.length("clearance", (0.0025, 0.005)), lay.magazine
+    start = -lay.length + draws.length("inset", (0.0, 0.004))
     solid = box((start, -1.4 * lay.tail), half, (low, high))
     tongue = rod(0, (-half, half), lay.hinge, high - lay.hinge, sections=20)
     solid += hull_of(tongue, box((-1.6 * lay.tail, -1.4 * lay.tail), half, (low, high)))
     return solid + box((start - 0.0015, start + 0.001), 0.8 * half, (low + 0.001, high - 0.001))
 
 
-def _arm(rng: Rng, lay: Layout, width: float) -> Solid:
+def _arm(draws: Draws, lay: Layout, width: float) -> Solid:
     """Shell above the magazine, with skirts that reach down beside it; narrow between the cheeks."""
     low = lay.magazine + GAP
-    tall = lay.length * rng.uniform(0.06, 0.28)
+    tall = lay.length * draws.number("height", (0.06, 0.28))
     narrow = lay.inside - GAP
-    front = -lay.length - rng.uniform(0.0, 0.006)
-    neck = -lay.run - 0.001
-    x = np.array(
-        [front, 0.85 * front, 0.6 * front, min(neck - 0.004, 0.35 * front), neck, 0.0, rng.uniform(0.3, 0.6) * lay.tail]
-    )
-    kind = pick(rng, ["straight", "arched", "nosed", "wedge", "tapered"])
-    if lay.back < lay.tail and rng.random() < 0.3:  # nothing behind the hinge keeps it from turning over
+    front = -lay.length - draws.length("reach", (0.0, 0.006))
+    neck, tail = -lay.run - 0.001, draws.number("tail", (0.3, 0.6)) * lay.tail
+    x = np.array([front, 0.85 * front, 0.6 * front, min(neck - 0.004, 0.35 * front), neck, 0.0, tail])
+    kind = draws.pick("shape", ["straight", "arched", "nosed", "wedge", "tapered"])
+    if lay.back < lay.tail and draws.chance("turns_over", 0.3):  # nothing behind the hinge keeps it from that
         kind = "tapered"
-    heights: Array = {
-        "straight": np.array([0.85, 0.95, 1.0, 1.0, 0.9, 0.8, 0.5]),
-        "arched": np.array([0.5, 0.8, 1.05, 1.05, 0.85, 0.7, 0.4]),
-        "nosed": np.array([1.0, 1.1, 0.85, 0.75, 0.7, 0.65, 0.45]),
-        "wedge": np.array([1.15, 1.1, 0.95, 0.8, 0.7, 0.6, 0.45]),
-        "tapered": np.array([1.0, 1.05, 0.95, 0.6, 0.25, 0.15, 0.1]),  # low at the hinge: turns over to lie behind
+    heights = {
+        "straight": (0.85, 0.95, 1.0, 1.0, 0.9, 0.8, 0.5),
+        "arched": (0.5, 0.8, 1.05, 1.05, 0.85, 0.7, 0.4),
+        "nosed": (1.0, 1.1, 0.85, 0.75, 0.7, 0.65, 0.45),
+        "wedge": (1.15, 1.1, 0.95, 0.8, 0.7, 0.6, 0.45),
+        "tapered": (1.0, 1.05, 0.95, 0.6, 0.25, 0.15, 0.1),  # low at the hinge: turns over to lie behind
     }[kind]
-    top = low + np.maximum(tall * heights, 0.004)
-    waist = rng.uniform(0.75, 1.0)
-    plan = np.array([0.5 * width * rng.uniform(0.8, 1.0), 0.5 * width, 0.5 * width, 0.5 * waist * width, 0, 0, 0])
-    plan = np.maximum(plan, narrow)
+    top = low + np.maximum(tall * np.array(heights), 0.004)
+    waist = draws.number("waist", (0.75, 1.0))
+    nose = 0.5 * width * draws.number("nose", (0.8, 1.0))
+    plan = np.maximum([nose, 0.5 * width, 0.5 * width, 0.5 * waist * width, 0, 0, 0], narrow)
     plan[-1] = 0.9 * narrow
-    bevel = rng.uniform(0.15, 0.6)
+    bevel = draws.number("bevel", (0.15, 0.6))
     sections = []
     for k in range(len(x)):
         cut = bevel * min(plan[k], top[k] - low)
@@ -156,12 +149,11 @@ def _arm(rng: Rng, lay: Layout, width: float) -> Solid:
         corners.append((plan[k] - 1.2 * cut, top[k]))
         sections.append(np.array([(x[k], side * max(y, 0.0), z) for y, z in corners for side in (-1, 1)]))
     solid = loft(sections)
-    hem = rng.uniform(0.15, 0.85) * (low - lay.base - 0.003)
+    hem = draws.number("skirt", (0.15, 0.85)) * (low - lay.base - 0.003)
     for side in (-1, 1):
-        y = sorted((side * (0.5 * lay.width + GAP), side * narrow))
+        y = ends((side * (0.5 * lay.width + GAP), side * narrow))
         skirt = [(0.92 * front, low + 0.001), (0.88 * front, low - hem), (neck, low - hem), (neck, low + 0.001)]
-        solid += prism(skirt, y[0], y[1], axis=1)
-        eye = rod(0, (y[0], y[1]), lay.hinge, 0.7 * lay.tail, sections=16)
-        ends = box((neck, 0.3 * lay.tail), (y[0], y[1]), (low, low + 0.002))
-        solid += hull_of(eye, ends)
+        solid += prism(skirt, *y, axis=1)
+        eye = rod(0, y, lay.hinge, 0.7 * lay.tail, sections=16)
+        solid += hull_of(eye, box((neck, 0.3 * lay.tail), y, (low, low + 0.002)))
     return solid

@@ -63,6 +63,11 @@ def rounded_rectangle(low: Vector, high: Vector, radius: float, steps: int = 4) 
     return np.concatenate([quarter[:: x * y] * (x, y) for x, y in signs]) + center
 
 
+def strips(first: Array, second: Array) -> list[Array]:
+    """Convex outlines that fill what lies between two edges, (N, 2) points each."""
+    return [np.concatenate([first[k : k + 2], second[k : k + 2]]) for k in range(len(first) - 1)]
+
+
 def superellipse(power: float, x: float, y: float, count: int) -> Array:
     """(count, 2) outline of half widths x and y: an ellipse for a power of 2, nearly a rectangle for 10."""
     angles = np.arange(count) * 2.0 * np.pi / count
