@@ -124,6 +124,7 @@ def _add_body(
             damping=number(joint.damping),
             frictionloss=number(joint.friction),
             actuatorfrcrange=numbers((-joint.effort, joint.effort)),
+            **({"stiffness": number(joint.spring), "springref": "0"} if joint.spring else {}),
             **more,
         )
     for look in looks:

@@ -275,7 +275,8 @@ def _add_joint(stage: Any, path: Any, joint: LinkJoint, robot: Robot, paths: lis
         added.CreateUpperLimitAttr(joint.upper * unit)
     drive = UsdPhysics.DriveAPI.Apply(added.GetPrim(), "linear" if slides else "angular")
     drive.CreateDampingAttr(joint.damping / unit)
-    drive.CreateStiffnessAttr(0.0)
+    drive.CreateStiffnessAttr(joint.spring / unit)
+    drive.CreateTargetPositionAttr(0.0)
     drive.CreateTypeAttr("force")
     drive.CreateMaxForceAttr(joint.effort)
     # Schemas of PhysX and Newton are not part of usd-core: they are named, and their attributes written, as these read

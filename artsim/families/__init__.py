@@ -14,6 +14,7 @@ import numpy as np
 
 from artsim.errors import ConfigError
 from artsim.families.constraints import AXES, LENGTHS, Constraints, Given, measured_length
+from artsim.families.physical import with_physics
 from artsim.making.assembly import Assembly
 from artsim.making.draws import Draw, Draws, UnmetError, key_of, ranges, values_of
 from artsim.model.objects import ArticulatedObject
@@ -177,7 +178,7 @@ def make_constrained(category: str, seed: int, constraints: Constraints) -> Arti
         if not missing:
             params = Params(category, seed, draw, values_of(draws.drawn))
             source = source_name(category, seed, constraints)
-            return replace(made.build(category, str(seed)), source=source, params=params)
+            return replace(with_physics(made.build(category, str(seed))), source=source, params=params)
         reached.append(made)
         seen.append({key_of(name): draw for name, draw in draws.drawn.items()})
     raise constraints.refusal(category, reached, {n: d for n, d in ranges(seen).items() if n in constraints.of_draws})
@@ -216,7 +217,7 @@ def _made_again(params: Params, seed: int, constraints: Mapping[str, Given]) -> 
     draws = Draws(_generator(params.category, params.seed, params.draw), params.values, lenient=True)
     made = FAMILIES[params.category](draws).build(params.category, str(params.seed))
     source = f"parameters of {params.category}:{params.seed}"
-    return replace(made, source=source, params=replace(params, values=values_of(draws.drawn)))
+    return replace(with_physics(made), source=source, params=replace(params, values=values_of(draws.drawn)))
 
 
 def _check(category: str, seed: int) -> None:

@@ -163,7 +163,7 @@ class Draws:
         return int(self._keep(key, Draw(value, "integer", least, most)))
 
     def chance(self, name: str, share: float, *, upper: bool = False) -> bool:
-        """True with the chance ``share``: if a flat number between 0 and 1 is below it, or, ``upper``, above the rest."""
+        """True with the chance ``share``: a flat number from 0 to 1 is below it, or, ``upper``, above the rest."""
         value = bool(self._rng.random() >= 1.0 - share if upper else self._rng.random() < share)
         key, wanted = self._asked(name)
         draw = Draw(value, "yes or no", high=share)

@@ -169,15 +169,11 @@ def _with_details(parts: tuple[Part, ...], listed: object, arrays: Mapping[str, 
     ends = np.cumsum([0, *(len(part.faces) for part in parts)])
     details: list[list[Detail]] = [[] for _ in parts]
     for entry in listed:
-        if (
-            not isinstance(entry, list)
-            or len(entry) != 5
-            or type(entry[1]) is not int
-            or not 0 <= entry[1] < len(parts)
-        ):
+        k = entry[1] if isinstance(entry, list) and len(entry) == 4 else None
+        if type(k) is not int or not 0 <= k < len(parts):
             raise ValueError(f"a detail is {entry!r:.60}")
         (label,) = _texts(entry[:1], 1)
-        k, T, size = entry[1], _numbers(entry[2], (4, 4)), _numbers(entry[3], (3,))
+        T, size = _numbers(entry[2], (4, 4)), _numbers(entry[3], (3,))
         faces = np.flatnonzero(owner[ends[k] : ends[k + 1]] == len(details[k]))
         details[k].append(Detail(label, T, size, faces=faces))
     return tuple(replace(part, details=tuple(own)) for part, own in zip(parts, details, strict=True))

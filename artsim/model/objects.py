@@ -64,6 +64,14 @@ class JointDynamics:
     damping: float | None = None
     friction: float | None = None
     """N m s or N s/m; N m or N."""
+    least_effort: float | None = None
+    """What the effort limit is at least, where ``effort`` does not say it."""
+    spring: float | None = None
+    """N m/rad or N/m: what pulls the joint to its rest state."""
+    hold: float | None = None
+    """N m or N: with which a magnet, gasket or latch holds the joint at rest; it fades as the joint opens."""
+    hold_over: float | None = None
+    """Radians or metres over which it fades to nothing."""
 
 
 UNKNOWN_DYNAMICS = JointDynamics()

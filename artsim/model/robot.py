@@ -97,6 +97,18 @@ class LinkJoint:
     """N m s or N s/m; N m or N."""
     mimic: tuple[str, float, float] | None = None
     """Name of the joint followed, multiplier, offset."""
+    spring: float = 0.0
+    """N m/rad or N/m: pulls it to 0."""
+    hold: float = 0.0
+    hold_over: float = 0.0
+    """A latch, magnet or gasket holds it at 0 with so many N m or N, less and less until it is so far open."""
+
+    def held(self, value: float) -> float:
+        """Effort of its latch at a state, against the way that it opens."""
+        if self.hold == 0.0 or not abs(value) < self.hold_over:
+            return 0.0
+        opens = 1.0 if self.upper >= -self.lower else -1.0
+        return -opens * self.hold * (1.0 - abs(value) / self.hold_over) if value * opens >= 0.0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +235,9 @@ def _joint(obj: ArticulatedObject, k: int, parent: int, child: int, carried: Ine
     kind = "continuous" if joint.type == "screw" else joint.type
     derived = _link_joint(joint.name, kind, parent, child, joint, joint.lower, joint.upper, carried, mimic)
     said = {} if body is None or obj.scale != 1.0 else asdict(body.joint)
-    return replace(derived, **{name: value for name, value in said.items() if value is not None})
+    least = said.pop("least_effort", None) or 0.0
+    known = replace(derived, **{name: value for name, value in said.items() if value is not None})
+    return replace(known, effort=max(known.effort, least))
 
 
 def _slide(name: str, joint: Joint, parent: int, child: int, carried: Inertia) -> LinkJoint:

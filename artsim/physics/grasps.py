@@ -179,6 +179,7 @@ class _Trial:
         self.hand = self.model.joint("hand").qposadr[0]
         self.slides = [self.model.joint(f"finger{side}").qposadr[0] for side in (0, 1)]
         self.target = self.model.body("target").mocapid[0]
+        self.latched = [(self.model.joint(joint.name), joint) for joint in robot.joints if joint.hold]
         self.joint = {k: self.model.joint(obj.tree.joints[k].name).qposadr[0] for k in obj.tree.free_joints}
 
     def _place(self, T: Array) -> None:
@@ -209,6 +210,13 @@ class _Trial:
                 return False
         return True
 
+    def _step(self) -> None:
+        """One time step with closing fingers; latches hold the joints, which MuJoCo knows nothing like."""
+        self.data.ctrl[:] = self.gripper.force
+        for named, joint in self.latched:
+            self.data.qfrc_applied[named.dofadr[0]] = joint.held(float(self.data.qpos[named.qposadr[0]]))
+        self.mujoco.mj_step(self.model, self.data)
+
     def opens(self, k: int, T: Array) -> float | None:
         """How far the hand opens the joint of part k from rest; None where it does not take the part along."""
         tree, model, data = self.obj.tree, self.model, self.data
@@ -217,13 +225,11 @@ class _Trial:
         goal = np.sign(far) * min(0.5 * abs(far), most)
         self._reset(T)
         for _ in range(round(_CLOSING / model.opt.timestep)):
-            data.ctrl[:] = self.gripper.force
-            self.mujoco.mj_step(model, data)
+            self._step()
         steps = round(_MOVING / model.opt.timestep)
         for step in range(steps):
             self._place(self._moved(k, T, goal * (step + 1) / steps))
-            data.ctrl[:] = self.gripper.force
-            self.mujoco.mj_step(model, data)
+            self._step()
         moved = float(data.qpos[self.joint[k]] - tree.rest[k])
         if not (np.isfinite(moved) and moved / goal >= _FOLLOWED):
             return None

@@ -108,6 +108,8 @@ class Simulation:
         self._follow = follow[:, self._driven]
         damping = self.options.damping * np.array([joint.damping for joint in joints])
         self._damping = self._follow.T @ (damping[:, None] * self._follow)
+        self._spring = self._follow.T @ (np.array([joint.spring for joint in joints])[:, None] * self._follow)
+        self._latched = [(j, joint) for j, joint in enumerate(joints) if joint.hold]
         self._friction = self.options.friction * np.array([joint.friction for joint in joints])
         self.body = ENGINES[self.engine](robot, self.options)
         self.reset()
@@ -195,11 +197,17 @@ class Simulation:
     def _advance(self, efforts: Array, target: Array, strength: Array) -> None:
         """One time step under efforts, (J,), with joints held at target speeds as far as strengths go, (J,) each."""
         time_step, follow = self.options.time_step, self._follow
+        if self._latched:
+            values, efforts = follow @ self._value + self._offset, efforts.copy()
+            for j, joint in self._latched:
+                efforts[j] += joint.held(float(values[j]))
         free, mass = self.body.advance(efforts)
         if not len(self._driven):
             return
         pulled = follow.T @ mass
-        momentum, mass = pulled @ free, pulled @ follow + time_step * self._damping
+        # Springs act as they stand at the end of the step: stiff ones on light parts stay calm.
+        momentum = pulled @ free - time_step * (self._spring @ self._value)
+        mass = pulled @ follow + time_step * self._damping + time_step**2 * self._spring
         rate = held_speeds(mass, momentum, follow, target, time_step * strength)
         value = self._value + time_step * rate
         inside = np.clip(value, self._lower, self._upper)
