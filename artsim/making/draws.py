@@ -87,6 +87,11 @@ class Draws:
         """Draws of a piece from a generator of its own, which is given or made: equal seeds make equal pieces."""
         return self._child(np.random.default_rng(seed), name)
 
+    def again(self) -> None:
+        """Forget what was drawn, for a family that draws the whole object anew: names begin at their first."""
+        self._trace.drawn.clear()
+        self._trace.counts.clear()
+
     def _child(self, rng: Rng, name: str) -> Draws:
         child = Draws.__new__(Draws)
         child._rng, child._trace, child._prefix = rng, self._trace, f"{self._prefix}{name}_" if name else self._prefix
