@@ -8,9 +8,10 @@ import numpy as np
 
 from artsim.common.products import apply, matmul
 from artsim.families.clearance import Link, narrow_limits
-from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.draws import Draws
 from artsim.making.outlines import rounded_rectangle
-from artsim.making.solids import Solid, box, cylinder, hull, hull_of, ring
+from artsim.making.solids import box, cylinder, hull, hull_of, ring, union
 from artsim.model.kinematics import Array
 from artsim.model.transforms import rotation_about
 
@@ -22,24 +23,25 @@ ARMS = (
     "YPRPRP", "YPRPRPR", "YPRPPRP", "YPRPSRPR", "YPRPRPRP",
 )  # fmt: skip
 SCARAS = ("PPS", "PPSR", "PPPS", "PPPSR")
+STOOP = {"shoulder_rest": (-25, 40), "elbow_rest": (40, 100), "wrist_rest": (10, 60)}
+"""Degrees by which the first three bends of an arm lean forward at rest."""
 
 
 class _Chain:
     """Links built one after the other, each from a pose: a point, a direction along the link, a lateral axis."""
 
-    def __init__(self, rng: Rng, radius: float):
-        self.rng = rng
-        self.radius = radius
+    def __init__(self, draws: Draws, reach: float):
+        self.draws = draws
+        self.radius = self.widest = reach * draws.number("thickness", (0.055, 0.085))
+        """Half the width of a joint; and of the link so far: the next one steps past that."""
         self.at: Array = np.zeros(3)
         self.along: Array = np.array([0.0, 0.0, 1.0])
         self.lateral: Array = np.array([0.0, 1.0, 0.0])
         self.links = [Link("base")]
-        self.collars = rng.random() < 0.6
-        self.square = rng.random() < 0.35
-        self.side = float(rng.choice([-1.0, 1.0]))
-        self.same_side = rng.random() < 0.5
-        self.widest = radius
-        """Half the width of the link so far: the next one steps past that."""
+        self.collars = draws.chance("collars", 0.6)
+        self.square = draws.chance("square", 0.35)
+        self.side = {"left": -1.0, "right": 1.0}[draws.pick("side", ["left", "right"])]
+        self.same_side = draws.chance("same_side", 0.5)
 
     @property
     def link(self) -> Link:
@@ -84,11 +86,9 @@ class _Chain:
         r = self.radius
         self.link.rod(self.at - 0.02 * r * self.along, self.at + 0.5 * r * self.along, r)
         face = self.at + 0.5 * r * self.along
-        limit = np.deg2rad(self.rng.uniform(120, 175))
-        joint = (
-            continuous(self.name, self.along, face) if spin else revolute(self.name, self.along, face, -limit, limit)
-        )
-        self.begin(joint)
+        limit = np.deg2rad(self.draws.degrees("roll_angle", (120, 175)))
+        about = self.name, self.along, face
+        self.begin(continuous(*about) if spin else revolute(*about, -limit, limit))
         self.link.narrowing = 0.97
         self.widest = r
         self.at = face + GAP * self.along
@@ -128,15 +128,16 @@ class _Chain:
         self.link.rod(mouth + GAP * d, mouth + 0.6 * r * d, 0.9 * r)
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """A robot arm, stretched out or bent at rest."""
     while True:
-        reach = rng.uniform(0.4, 1.6)
-        chain = _Chain(rng, reach * rng.uniform(0.055, 0.085))
-        if rng.random() < 0.17:
-            _scara(chain, reach, pick(rng, SCARAS))
+        draws.again()
+        reach = draws.length("length", (0.4, 1.6))
+        chain = _Chain(draws, reach)
+        if draws.chance("scara", 0.17):
+            _scara(chain, reach, draws.pick("scara_joints", SCARAS))
         else:
-            _arm(chain, reach, pick(rng, ARMS))
+            _arm(chain, reach, draws.pick("arm_joints", ARMS))
         spread = _tool(chain)
         if narrow_limits(chain.links, 0.025 * reach):
             break
@@ -151,72 +152,67 @@ def build(rng: Rng) -> Assembly:
 
 def _arm(chain: _Chain, reach: float, kinds: str) -> None:
     """An upright arm with a turret, its elbow bent by chance."""
-    rng, r = chain.rng, chain.radius
+    draws, r = chain.draws, chain.radius
     _base(chain, reach)
     bends = kinds.count("P")
-    angles = _rest_angles(rng, bends)
+    angles = np.zeros(bends)  # of every bend at rest: upright, or as a crane stoops
+    if not draws.chance("upright", 0.25):
+        stoop = [draws.degrees(name, ends) for name, ends in STOOP.items()]
+        angles[:3] = -np.deg2rad(stoop)[:bends]
     long_limbs = 2 if bends > 1 else 1
     bend = 0
     for k, kind in enumerate(kinds):
         following = kinds[k + 1] if k + 1 < len(kinds) else ""
-        thin = chain.radius * rng.uniform(0.8, 0.97)
+        thin = chain.radius * draws.number("joint_taper", (0.8, 0.97))
         if kind in "YR":
-            chain.roll(spin=not following and rng.random() < 0.5)
+            chain.roll(spin=not following and draws.chance("last_spins", 0.5))
             length = 1.3 * chain.radius if following else 0.6 * chain.radius
             if kind == "R" and bend <= long_limbs:  # the second half of a limb with a roll in it
-                length = max(length, reach * rng.uniform(0.14, 0.22))
+                length = max(length, reach * draws.number("roll_length", (0.14, 0.22)))
             chain.limb(length, thin if following else chain.radius)
         elif kind == "P":
-            limit = np.deg2rad(rng.uniform(95, 150))
-            chain.bend(angles[bend], thin, (-limit * rng.uniform(0.6, 1.0), limit))
+            limit = np.deg2rad(draws.degrees("bend_angle", (95, 150)))
+            chain.bend(angles[bend], thin, (-limit * draws.number("bend_back", (0.6, 1.0)), limit))
             bend += 1
-            length = reach * rng.uniform(0.28, 0.42) if bend <= long_limbs else 2.3 * r * rng.uniform(0.8, 1.2)
-            if following in ("R", "S") and bend <= long_limbs:
-                length *= 0.5
-            plate = following == "P" and bend <= long_limbs and rng.random() < 0.4
-            chain.limb(length, chain.radius * rng.uniform(0.8, 0.95), plate)
+            if bend <= long_limbs:
+                length = reach * draws.number("limb_length", (0.28, 0.42))
+                length *= 0.5 if following in ("R", "S") else 1.0
+            else:
+                length = 2.3 * r * draws.number("wrist_length", (0.8, 1.2))
+            plate = following == "P" and bend <= long_limbs and draws.chance("plate", 0.4)
+            chain.limb(length, chain.radius * draws.number("limb_taper", (0.8, 0.95)), plate)
         else:
-            depth = reach * rng.uniform(0.16, 0.26)
+            depth = reach * draws.number("sleeve_length", (0.16, 0.26))
             chain.slide(depth, 0.7 * depth)
             chain.limb(1.5 * chain.radius, chain.radius)
 
 
-def _rest_angles(rng: Rng, bends: int) -> Array:
-    """Angle of every bend at rest: upright, or as a crane stoops."""
-    if rng.random() < 0.25:
-        return np.zeros(bends)
-    angles = np.zeros(bends)
-    stoop = -np.deg2rad([rng.uniform(-25, 40), rng.uniform(40, 100), rng.uniform(10, 60)])
-    angles[: min(bends, 3)] = stoop[: min(bends, 3)]
-    return angles
-
-
 def _base(chain: _Chain, reach: float) -> None:
     """Plate and column, on a rail by chance."""
-    rng, r = chain.rng, chain.radius
-    if rng.random() < 0.15:
+    draws, r = chain.draws, chain.radius
+    if draws.chance("rail", 0.15):
         _rail(chain, reach)
     link = chain.link
     floor = chain.at.copy()
-    height = r * rng.uniform(1.0, 3.5)
-    wide = r * rng.uniform(1.15, 1.7)
+    height = r * draws.number("base_height", (1.0, 3.5))
+    wide = r * draws.number("base_width", (1.15, 1.7))
     thick = 0.25 * r
-    if rng.random() < 0.5:
+    if draws.chance("round_base", 0.5):
         link.rod(floor, floor + (0, 0, thick), wide)
     else:
         link.solid += box(floor - (wide, wide, 0), floor + (wide, wide, thick), fillet=0.2 * wide, axis=2)
         link.guard(floor, floor + (0, 0, thick), 1.3 * wide)
-    foot = r * rng.uniform(1.0, 1.15)
+    foot = r * draws.number("column_foot", (1.0, 1.15))
     link.rod(floor + (0, 0, 0.5 * thick), floor + (0, 0, height), foot, r)
     chain.at = floor + (0, 0, height - 0.1 * r)
 
 
 def _rail(chain: _Chain, reach: float) -> None:
     """A linear axis under the arm: a beam, and a carriage that slides along it."""
-    rng, r = chain.rng, chain.radius
-    axis = int(rng.integers(2))
+    draws, r = chain.draws, chain.radius
+    axis = {"x": 0, "y": 1}[draws.pick("rail_axis", ["x", "y"])]
     other = 1 - axis
-    half, travel = 1.6 * r, reach * rng.uniform(0.4, 0.9)
+    half, travel = 1.6 * r, reach * draws.number("rail_length", (0.4, 0.9))
     low, high = np.zeros(3), np.zeros(3)
     low[axis], high[axis] = -half, half + travel
     low[other], high[other] = -1.1 * r, 1.1 * r
@@ -240,10 +236,10 @@ def _rail(chain: _Chain, reach: float) -> None:
 
 def _scara(chain: _Chain, reach: float, kinds: str) -> None:
     """Flat links above one another on a column, with a quill that goes up and down."""
-    rng = chain.rng
+    draws = chain.draws.within("scara")
     r = chain.radius = 1.15 * chain.radius
-    height = reach * rng.uniform(0.35, 0.6)
-    wide = r * rng.uniform(1.2, 1.6)
+    height = reach * draws.number("height", (0.35, 0.6))
+    wide = r * draws.number("base_width", (1.2, 1.6))
     chain.link.rod((0, 0, 0), (0, 0, 0.3 * r), wide)
     chain.link.rod((0, 0, 0.2 * r), (0, 0, height), r)
     chain.at = np.array([0.0, 0.0, height])
@@ -251,10 +247,11 @@ def _scara(chain: _Chain, reach: float, kinds: str) -> None:
     chain.side, chain.same_side = 1.0, True
     bends = kinds.count("P")
     for k in range(bends):
-        limit = np.deg2rad(rng.uniform(100, 150))
-        angle = 0.0 if k == 0 else np.deg2rad(rng.uniform(-60, 60))
-        chain.bend(angle, chain.radius * rng.uniform(0.85, 0.95), (-limit, limit))
-        chain.limb(reach * rng.uniform(0.55, 0.8) / bends, chain.radius * rng.uniform(0.75, 0.95), plate=True)
+        limit = np.deg2rad(draws.degrees("bend_angle", (100, 150)))
+        angle = np.deg2rad(draws.degrees("rest_angle", (-60, 60))) if k else 0.0
+        chain.bend(angle, chain.radius * draws.number("joint_taper", (0.85, 0.95)), (-limit, limit))
+        length = reach * draws.number("limb_length", (0.55, 0.8)) / bends
+        chain.limb(length, chain.radius * draws.number("limb_taper", (0.75, 0.95)), plate=True)
     _quill(chain, height)
     if kinds.endswith("R"):
         chain.roll(spin=True)
@@ -280,9 +277,8 @@ def _quill(chain: _Chain, height: float) -> None:
 
 def _tool(chain: _Chain) -> float | None:
     """What the last link carries; for a gripper, half its width in metres."""
-    kind = pick(chain.rng, {"gripper": 0.55, "suction": 0.15, "probe": 0.15, "flange": 0.15})
-    r, d, link = chain.radius, chain.along, chain.link
-    end = chain.at
+    kind = chain.draws.pick("tool", {"gripper": 0.55, "suction": 0.15, "probe": 0.15, "flange": 0.15})
+    r, d, link, end = chain.radius, chain.along, chain.link, chain.at
     if kind == "flange":
         link.rod(end - 0.1 * r * d, end + 0.2 * r * d, 0.7 * r)
     elif kind == "suction":
@@ -291,43 +287,36 @@ def _tool(chain: _Chain) -> float | None:
     elif kind == "probe":
         link.rod(end - 0.1 * r * d, end + 0.6 * r * d, 0.5 * r)
         link.rod(end + 0.5 * r * d, end + 2.2 * r * d, 0.35 * r, 0.08 * r)
-    else:
-        return _palm(chain)
+    else:  # the body of a parallel gripper
+        half = r * chain.draws.number("gripper_width", (1.1, 1.5))
+        v = np.cross(d, chain.lateral)
+        outline = matmul(rounded_rectangle((-half, -0.6 * r), (half, 0.6 * r), 0.25 * r, 2), [chain.lateral, v])
+        low, high = end - 0.1 * r * d, end + 0.8 * r * d
+        link.solid += hull(np.concatenate([low + outline, high + outline]))
+        chain.at = high
+        link.guard(low, high + 2.6 * r * d, 1.05 * half)
+        return half
     return None
-
-
-def _palm(chain: _Chain) -> float:
-    """The body of a parallel gripper; returns half its width in metres."""
-    r, d, link = chain.radius, chain.along, chain.link
-    half = r * chain.rng.uniform(1.1, 1.5)
-    v = np.cross(d, chain.lateral)
-    outline = matmul(rounded_rectangle((-half, -0.6 * r), (half, 0.6 * r), 0.25 * r, 2), [chain.lateral, v])
-    low, high = chain.at - 0.1 * r * d, chain.at + 0.8 * r * d
-    link.solid += hull(np.concatenate([low + outline, high + outline]))
-    chain.at = high
-    link.guard(low, high + 2.6 * r * d, 1.05 * half)
-    return half
 
 
 def _fingers(arm: Assembly, chain: _Chain, half: float) -> None:
     """Two fingers that open sideways, one as the mimic of the other."""
     r, d, u = chain.radius, chain.along, chain.lateral
     v = np.cross(d, u)
-    length = r * chain.rng.uniform(1.4, 2.3)
-    thick = 0.28 * half
-    tip = chain.rng.uniform(0.4, 1.0)
+    length = r * chain.draws.number("finger_length", (1.4, 2.3))
+    tip = chain.draws.number("finger_tip", (0.4, 1.0))
+    thick, inner = 0.28 * half, 0.5 * GAP
+    # From the middle outwards, along the finger, and half its width.
+    blocks = [
+        ((inner, inner + 1.6 * thick), (GAP, 0.4 * r), 0.42 * r),
+        ((inner + 0.3 * thick, inner + 1.3 * thick), (0.35 * r, length), 0.3 * r),
+        ((inner, inner + 0.8 * thick), (length - 0.5 * r * tip, length + 0.05 * r), 0.3 * r),
+    ]
     for number, side in enumerate((1.0, -1.0)):
-
-        def block(reach: tuple[float, float], low: float, high: float, wide: float, side: float = side) -> Solid:
-            corners = [
-                chain.at + side * a * u + b * d + c * v for a in reach for b in (low, high) for c in (-wide, wide)
-            ]
-            return hull(corners)
-
-        inner = 0.5 * GAP
-        finger = block((inner, inner + 1.6 * thick), GAP, 0.4 * r, 0.42 * r)
-        finger += block((inner + 0.3 * thick, inner + 1.3 * thick), 0.35 * r, length, 0.3 * r)
-        finger += block((inner, inner + 0.8 * thick), length - 0.5 * r * tip, length + 0.05 * r, 0.3 * r)
+        finger = union(
+            hull([chain.at + side * a * u + b * d + c * v for a in out for b in along for c in (-wide, wide)])
+            for out, along, wide in blocks
+        )
         travel = half - inner - 1.6 * thick
         mimic = ("finger_0", 1.0) if number else None
         arm.add(f"finger_{number}", finger, prismatic(chain.name, side * u, 0.0, travel, chain.at, mimic=mimic))
