@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from artsim.common.elementary import cos
 from artsim.common.products import dot, matmul, norm, unit
-from artsim.making.assembly import JointSpec, Rng
+from artsim.making.assembly import JointSpec
+from artsim.making.draws import Rng
 from artsim.making.outlines import Vector
 from artsim.making.solids import Solid, cylinder
 from artsim.model.joints import Joint

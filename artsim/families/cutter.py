@@ -43,7 +43,7 @@ def build(draws: Draws) -> Assembly:
     blade_end = end - max(c.wall + 0.002, 0.005) - c.length * draws.number("blade_inset", (0.0, 0.1))
     point = front + draws.length("point_inset", (0.0005, 0.003))
     slant = point + 2 * c.blade_half * tan(draws.angle("point_angle", (0.35, 1.0)))
-    side = {"right": -c.blade_half, "left": c.blade_half}[draws.pick("point_side", ["right", "left"])]
+    side = draws.side("back_side") * c.blade_half
     outline = [(point, -side), (slant, side), (blade_end, side), (blade_end, -side)]
     blade = prism(outline, c.channel, c.channel + c.sheet)
     button = min(c.length * draws.number("button_length", (0.05, 0.2)), 0.03)

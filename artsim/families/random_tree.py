@@ -16,7 +16,8 @@ import numpy as np
 
 from artsim.common.elementary import cos, exp, log
 from artsim.common.products import apply, matmul, norm, unit
-from artsim.making.assembly import Assembly, JointSpec, Rng, pick
+from artsim.making.assembly import Assembly, JointSpec
+from artsim.making.draws import Draws
 from artsim.making.solids import Solid, box, ellipsoid, hull, ring, rod, tube, union
 from artsim.model.kinematics import Array
 from artsim.model.transforms import rotation_about
@@ -70,41 +71,39 @@ class _Branch:
     """Branch, joint, and where the branch's frame stands: rotation (3, 3) and position (3,)."""
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """A random articulated object."""
-    count = int(rng.integers(2, 13))
-    parents = _parents(rng, count, int(rng.integers(1, 7)))
-    scale = rng.uniform(0.04, 0.12)
-    root = _grow(rng, 0, parents, scale)
+    count = 1 + draws.integer("parts", 1, 11)
+    parents = _parents(draws, count, draws.integer("deepest", 1, 6))
+    root = _grow(draws, 0, parents, draws.length("scale", (0.04, 0.12)))
     tree = Assembly()
     _put(tree, root, (f"part_{k}" for k in itertools.count()), None, np.eye(3), np.zeros(3))
     return tree
 
 
-def _parents(rng: Rng, count: int, depth: int) -> list[int]:
+def _parents(draws: Draws, count: int, depth: int) -> list[int]:
     """Parent of every part; -1 for the root. Long chains are as likely as bushes."""
     parents, depths = [-1], [0]
-    eager = rng.uniform(0.0, 1.0)
+    eager = draws.number("chains", (0.0, 1.0))
     for k in range(1, count):
         allowed = [i for i in range(k) if depths[i] < depth and parents.count(i) < 5]
         if not allowed:
             break
-        parent = allowed[-1] if rng.random() < eager else int(rng.choice(allowed))
-        parents.append(parent)
-        depths.append(depths[parent] + 1)
+        parents.append(allowed[-1] if draws.chance("goes_on", eager) else draws.pick("parent", allowed))
+        depths.append(depths[parents[-1]] + 1)
     return parents
 
 
-def _grow(rng: Rng, k: int, parents: list[int], scale: float) -> _Branch:
+def _grow(draws: Draws, k: int, parents: list[int], scale: float) -> _Branch:
     """Part ``k`` with everything that hangs on it."""
-    size = scale * rng.uniform(0.6, 1.5, 3) * (1.6 if k == 0 else 1.0)
-    solid = _shape(rng, size)
+    size = scale * draws.numbers("side", 0.6, 1.5, 3) * (1.6 if k == 0 else 1.0)
+    solid = _shape(draws, size)
     bounds = solid.bounds()
     branch = _Branch(solid, [bounds])
     if k > 0:  # stand on z = 0, on a neck by chance
         neck = 0.12 * float(size.min()) + 0.002
-        hinged = rng.random() < 0.4
-        lift = neck + rng.uniform(0.5, 1.0) * float(bounds[1, :2].max()) if hinged else 0.0
+        hinged = draws.chance("neck", 0.4)
+        lift = neck + draws.number("neck_length", (0.5, 1.0)) * float(bounds[1, :2].max()) if hinged else 0.0
         branch.solid = solid.moved((0, 0, lift - bounds[0, 2]))
         branch.boxes = [branch.solid.bounds()]
         if hinged:
@@ -117,9 +116,9 @@ def _grow(rng: Rng, k: int, parents: list[int], scale: float) -> _Branch:
     motions: list[_Motion] = []
     faces = [f for f in product(range(3), (-1, 1)) if k == 0 or f != (2, -1)]
     for child in (i for i, parent in enumerate(parents) if parent == k):
-        grown = _grow(rng, child, parents, scale * rng.uniform(0.8, 1.0))
-        motion = _motion(rng, grown, motions)
-        face = _attach(rng, branch, grown, motion, faces, bounds)
+        grown = _grow(draws, child, parents, scale * draws.number("shrink", (0.8, 1.0)))
+        motion = _motion(draws, grown, motions)
+        face = _attach(draws, branch, grown, motion, faces, bounds)
         if face is not None:
             faces.remove(face)
             motions.append(motion)
@@ -127,9 +126,9 @@ def _grow(rng: Rng, k: int, parents: list[int], scale: float) -> _Branch:
     return branch
 
 
-def _shape(rng: Rng, size: Array) -> Solid:
+def _shape(draws: Draws, size: Array) -> Solid:
     """A simple solid about the origin with roughly the given sides."""
-    kind = pick(rng, SHAPES)
+    kind = draws.pick("shape", SHAPES)
     half = 0.5 * size
     x, y, z = half
     thin = 0.22 * float(size.min())
@@ -138,7 +137,7 @@ def _shape(rng: Rng, size: Array) -> Solid:
     if kind == "cylinder":
         return rod(0, 0, (-z, z), min(x, y))
     if kind == "cone":
-        return rod(0, 0, (-z, z), min(x, y), rng.uniform(0.2, 0.7) * min(x, y))
+        return rod(0, 0, (-z, z), min(x, y), draws.number("cone_top", (0.2, 0.7)) * min(x, y))
     if kind == "ball":
         return ellipsoid((0, 0, 0), 0.5 * (half + half.min()))
     if kind == "frame":
@@ -159,35 +158,37 @@ def _shape(rng: Rng, size: Array) -> Solid:
     return box(-half, half)
 
 
-def _motion(rng: Rng, branch: _Branch, siblings: list[_Motion]) -> _Motion:
+def _motion(draws: Draws, branch: _Branch, siblings: list[_Motion]) -> _Motion:
     """A joint for a branch; by chance one that follows the joint of a sibling."""
     bounds = branch.boxes[0]
     extent = float((bounds[1] - bounds[0]).max())
     axis, origin = np.array([0.0, 0.0, 1.0]), np.zeros(3)
     if branch.hinge_height is not None:
-        axis, origin = np.eye(3)[int(rng.integers(2))], np.array([0.0, 0.0, branch.hinge_height])
-        return _Motion("revolute", axis, origin, -rng.uniform(0.0, 1.3), rng.uniform(0.3, 1.3))
+        axis = np.eye(3)[{"x": 0, "y": 1}[draws.pick("hinge_axis", ["x", "y"])]]
+        origin = np.array([0.0, 0.0, branch.hinge_height])
+        lower, upper = -draws.angle("hinge_lower", (0.0, 1.3)), draws.angle("hinge_upper", (0.3, 1.3))
+        return _Motion("revolute", axis, origin, lower, upper)
     leaders = [i for i, motion in enumerate(siblings) if motion.follows is None and motion.type != "screw"]
-    if leaders and rng.random() < 0.4:
-        source = leaders[int(rng.integers(len(leaders)))]
-        leader, multiplier = siblings[source], float(rng.choice([-1.0, 0.5, 1.0]))
+    if leaders and draws.chance("follows", 0.4):
+        source = draws.pick("leader", leaders)
+        leader, multiplier = siblings[source], draws.pick("ratio", [-1.0, 0.5, 1.0])
         lower, upper = sorted((multiplier * leader.lower, multiplier * leader.upper))
         return _Motion(leader.type, axis, origin, lower, upper, 0.0, source, multiplier)
-    kind = pick(rng, JOINTS)
-    if rng.random() < 0.15:  # oblique
-        axis = unit(axis + rng.normal(0.0, 0.2, 3))
+    kind = draws.pick("joint", JOINTS)
+    if draws.chance("oblique", 0.15):
+        axis = unit(axis + draws.rng.normal(0.0, 0.2, 3))
     if kind == "prismatic":
-        return _Motion(kind, axis, origin, 0.0, rng.uniform(0.2, 0.9) * extent)
+        return _Motion(kind, axis, origin, 0.0, draws.number("travel", (0.2, 0.9)) * extent)
     if kind == "screw":
-        turns = rng.uniform(0.5, 3.0) * 2.0 * np.pi
-        return _Motion(kind, axis, origin, 0.0, turns, rng.uniform(0.2, 0.6) * extent / turns)
+        turns = draws.number("screw_turns", (0.5, 3.0)) * 2.0 * np.pi
+        return _Motion(kind, axis, origin, 0.0, turns, draws.number("screw_travel", (0.2, 0.6)) * extent / turns)
     if kind == "continuous":
         return _Motion(kind, axis, origin, -np.inf, np.inf)
-    return _Motion(kind, axis, origin, -rng.uniform(0.0, 1.5), rng.uniform(0.3, 1.5))
+    return _Motion(kind, axis, origin, -draws.angle("lower", (0.0, 1.5)), draws.angle("upper", (0.3, 1.5)))
 
 
 def _attach(
-    rng: Rng, parent: _Branch, child: _Branch, motion: _Motion, faces: list[tuple[int, int]], bounds: Array
+    draws: Draws, parent: _Branch, child: _Branch, motion: _Motion, faces: list[tuple[int, int]], bounds: Array
 ) -> tuple[int, int] | None:
     """Hang a branch on a free face of its parent, on a stub just long enough to keep all boxes apart.
 
@@ -204,11 +205,12 @@ def _attach(
     lift = GAP - min(0.0, float(swept[over, 0, 2].min()))
     inner = 0.5 * (bounds[0] + bounds[1])
     shortest, chosen = np.inf, None
-    for choice in rng.permutation(len(faces)):
+    for choice in draws.rng.permutation(len(faces)):
         if chosen is not None and shortest < 0.05:
             break
         axis, side = faces[choice]
-        turn = rng.uniform(0, 2 * np.pi) if rng.random() < 0.3 else 0.5 * np.pi * rng.integers(4)
+        askew = draws.chance("askew", 0.3)
+        turn = draws.angle("turn", (0, 2 * np.pi)) if askew else 0.5 * np.pi * draws.integer("quarter_turns", 0, 3)
         # (3, 3) rotation that takes z to a coordinate direction.
         normal = side * np.eye(3)[axis]
         u = np.abs(np.roll(normal, 1))

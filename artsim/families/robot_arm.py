@@ -40,7 +40,7 @@ class _Chain:
         self.links = [Link("base")]
         self.collars = draws.chance("collars", 0.6)
         self.square = draws.chance("square", 0.35)
-        self.side = {"left": -1.0, "right": 1.0}[draws.pick("side", ["left", "right"])]
+        self.side = draws.side("side")
         self.same_side = draws.chance("same_side", 0.5)
 
     @property
