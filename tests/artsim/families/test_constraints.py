@@ -18,14 +18,15 @@ from artsim.families import FAMILIES, make
 from artsim.families.catalogue import describe_family, parameters
 from artsim.families.constraints import Constraints
 from artsim.loading.sources import FamilySource, family_sources
+from artsim.making.draws import Draws
 
 CATEGORIES = sorted(FAMILIES)
 
 
 @pytest.mark.parametrize("category", CATEGORIES)
 def test_objects_without_constraints_are_those_of_category_and_seed_alone(category: str) -> None:
-    rng = np.random.default_rng([zlib.crc32(category.encode()), 3])
-    drawn = FAMILIES[category](rng).build(category, "3")
+    draws = Draws(np.random.default_rng([zlib.crc32(category.encode()), 3]))
+    drawn = FAMILIES[category](draws).build(category, "3")
     made = make(category, 3)
     assert made.sha256 == drawn.sha256
     assert made.source == f"{category}:3"
