@@ -114,6 +114,8 @@ DRAWS = 300
 """Draws at most until one meets the constraints: what one in a hundred has is found 19 times of 20."""
 _RESIZED = 4
 """Times that an object is planned again to have a length: each leaves a tenth or less of what was amiss."""
+_OVERALL = ("length", "scale")
+"""Parameters that others are shares of."""
 
 
 def make(category: str | Params, seed: int = 0, **constraints: Given) -> ArticulatedObject:
@@ -189,7 +191,7 @@ def _resized(
 ) -> tuple[Assembly, Draws, list[str]]:
     """The same draw with other lengths among its parameters, so that its box at rest has the ones that are asked for.
 
-    The parameter of a length's name is scaled, and all three for the size.
+    The parameter of a length's name is scaled, or else one that others are shares of; and all three for the size.
     """
     asked = {name: wanted for name, wanted in constraints.wanted if name in LENGTHS and isinstance(wanted, tuple)}
     lengths: dict[str, float] = {}
@@ -201,8 +203,8 @@ def _resized(
                 low, high = 1.02 * low, 0.98 * high
             now = measured_length(made, name)
             for side in AXES if name == "size" else (name,):
-                if side in draws.drawn:
-                    lengths[side] = float(draws.drawn[side].value) * min(max(now, low), high) / now
+                scaled = [draw for draw in (side, *_OVERALL) if draw in draws.drawn][:1]
+                lengths |= {d: float(draws.drawn[d].value) * min(max(now, low), high) / now for d in scaled}
         if not missing or not lengths:
             break
         draws = Draws(_generator(category, seed, draw), {**constraints.of_draws, **lengths})
