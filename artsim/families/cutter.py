@@ -21,7 +21,7 @@ class _Case:
     def __init__(self, draws: Draws) -> None:
         self.length = length = draws.length("length", (0.07, 0.3))
         self.half = 0.5 * length * draws.number("width", (0.075, 0.45))
-        self.height = max(min(2 * self.half * draws.number("thickness", (0.2, 1.0)), 0.26 * length), 0.009)
+        self.height = max(min(2 * self.half * draws.number("height", (0.2, 1.0)), 0.26 * length), 0.009)
         if draws.chance("slim", 0.15):  # of sheet steel
             self.height = max(length * draws.number("slim_thickness", (0.02, 0.05)), 0.006)
         self.wall = min(draws.length("wall", (0.0016, 0.003)), 0.22 * self.height)

@@ -51,7 +51,7 @@ def build(draws: Draws) -> Assembly:
     """A pen; its long axis is upright. Half of those with a cap stand on their end."""
     length = draws.length("length", (0.08, 0.2))
     slim = draws.chance("slim", 0.3)
-    radius = length * draws.number("thickness", (0.02, 0.045) if slim else (0.045, 0.14))
+    radius = length * draws.number("width", (0.02, 0.045) if slim else (0.045, 0.14))
     kind = draws.pick("kind", {"cap": 0.42, "button": 0.27, "twist": 0.13, "sliders": 0.09, "double": 0.09})
     turning = kind == "twist" or (kind == "cap" and draws.chance("cap_screws", 0.3))
     sides = draws.pick("sides", {_ROUND: 0.5, 3: 0.1, 4: 0.12, 6: 0.18, 8: 0.1})

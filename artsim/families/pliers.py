@@ -23,7 +23,7 @@ def build(draws: Draws) -> Assembly:
     kind = draws.pick("jaws", ["combination", "nose", "flat", "cutting", "hollow"])
     usual = {"nose": 0.36, "cutting": 0.13, "flat": 0.26}.get(kind, 0.22)
     jaw = length * usual * draws.number("jaw_length", (0.75, 1.3))
-    thick = length * draws.number("thickness", (0.035, 0.11))
+    thick = length * draws.number("height", (0.035, 0.11))
     disc = length * draws.number("joint_radius", (0.05, 0.075))
     jaws = _jaw(draws.within("jaw"), kind, jaw, disc)
     path, radii = _grip(draws.within("handle"), length - jaw, disc, length)

@@ -42,7 +42,7 @@ def build(draws: Draws) -> Assembly:
     """A stapler, closed at rest; what turns about the hinge opens upwards."""
     lay = Layout(draws)
     length = lay.length
-    arm_width = max(lay.width * draws.number("arm_width", (1.25, 2.6)), 2 * lay.inside)
+    arm_width = max(lay.width * draws.number("width", (1.25, 2.6)), 2 * lay.inside)
     if draws.chance("mini", 0.15):  # short and wide, like those for a schoolbag
         arm_width = min(arm_width * draws.number("mini_width", (1.4, 2.1)), 0.5 * length)
     stapler = Assembly("base", _base(draws.within("base"), lay, arm_width), 2500.0)

@@ -49,7 +49,7 @@ def build(draws: Draws) -> Assembly:
     sides = zip(("length", "width", "thickness"), measures, strict=True)
     plug = _Plug(*(v * scale * draws.number(f"plug_{name}", (0.9, 1.15)) for name, v in sides))
     half = plug.half * draws.number("width", (1.25, 2.6))
-    thick = plug.thick * draws.triangular("thickness", 1.4, 1.9, 4.2)
+    thick = plug.thick * draws.triangular("height", 1.4, 1.9, 4.2)
     stick = _Stick(plug.reach * draws.number("length", (1.1, 4.2)), half, thick, plug)
     usb = Assembly(density=1200.0)
     kinds = {"capped": _capped, "two_caps": _two_caps, "swivel": _swivel, "sleeve": _sleeved, "retracting": _retracting}
