@@ -4,12 +4,13 @@ The frame is that of PartNet-Mobility's scissors: rings at -Y, the root's toward
 +Z. Both blades are built with their points at -X, and turned in the end.
 
 Varied: length, the share of the blades, their width, points and backs, handles of metal rods or thick plastic, rings
-round or long, alike or one longer than the other, offset to one side, open finger rests, and the pivot.
+round or long, alike or one longer than the other, offset to one side, apart, level or bent up, open finger rests, and
+the pivot.
 """
 
 import numpy as np
 
-from artsim.common.elementary import arcsin, arctan2, cos, hypot, sin
+from artsim.common.elementary import arcsin, arctan2, cos, hypot, sin, tan
 from artsim.common.products import dot, matmul, norm
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
@@ -20,45 +21,59 @@ from artsim.model.kinematics import Array
 GAP = 0.0005
 _POINTS_TO_Y = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """Quarter turn that takes -X, where blades are built with their points, to +Y, and rings at -Y to -X."""
+LENGTHS = {False: ((0.17, 0.27), (0.13, 0.27)), True: ((0.27, 0.35), (0.27, 0.38))}
+"""Half the length of a ring over that of the handle, usual and widest, of round and of long ones."""
 
 
 class Ring:
-    """A finger ring at the +Y side, clear of the middle by its bar; the second of two unlike ones is long."""
+    """A finger ring at the +Y side, clear of the middle by its bar; the second of two unlike ones is long.
 
-    def __init__(self, draws: Draws, reach: float, bar: float, kind: str, second: bool, plastic: bool) -> None:
+    It lies level, or rises towards the back, as those of dressmakers' shears do over the cloth. It ends at ``front``.
+    """
+
+    def __init__(
+        self, draws: Draws, front: float, reach: float, bar: float, kind: str, second: bool, plastic: bool, slope: float
+    ) -> None:
+        self.slope = slope
         long = kind != "same" and second
-        along = reach * draws.number("length", (0.27, 0.35) if long else (0.17, 0.27)) * (1.1 if plastic else 1.0)
+        along = reach * draws.number("length", *LENGTHS[long]) * (1.1 if plastic else 1.0)
+        shift = reach * draws.number("offset", (0.05, 0.12)) if kind == "offset" and not second else 0.0
+        along = min(along, 0.5 * (reach - bar - shift - front))
         oval = long or draws.chance("oval", 0.5)
-        across = min(along, reach * draws.number("width", (0.13, 0.2))) if oval else along * 0.95
+        across = min(along, reach * draws.number("width", (0.13, 0.2), (0.11, 0.22))) if oval else along * 0.95
         self.radii = np.array([along, across])  # of its middle line, along and across
         self.turn = draws.angle("turn", (0.0, 0.3))  # of its long axis from X
         self.egg = draws.number("egg", (0.0, 0.35))  # by how much it is wider at the back than at the front
         half = hypot(along * sin(self.turn), (1 + self.egg) * across * cos(self.turn)) + 0.6 * bar
-        y = half + GAP + reach * draws.number("spacing", (0.0, 0.05))
-        shift = reach * draws.number("offset", (0.05, 0.12)) if kind == "offset" and not second else 0.0
+        y = half + GAP + reach * draws.number("spacing", (0.0, 0.05), (0.0, 0.12))
         self.center = np.array([reach - along - bar - shift, y])
 
     def loop(self) -> Array:
-        """(22, 2) points of the ring's middle line."""
+        """(22, 3) points of the ring's middle line, which is level as far as where it comes nearest to the pivot."""
         angles = np.linspace(0.0, 2.0 * np.pi, 22, endpoint=False)
         wide = self.radii[1] * (1 + self.egg * cos(angles))
         u = np.column_stack([self.radii[0] * cos(angles), wide * sin(angles)])
         c, s = cos(self.turn), sin(self.turn)
-        return self.center + matmul(u, [[c, s], [-s, c]])
+        plan = self.center + matmul(u, [[c, s], [-s, c]])
+        rise = self.slope * np.maximum(plan[:, 0] - plan[np.argmin(norm(plan)), 0], 0.0)
+        return np.column_stack([plan, rise])
 
 
 def build(draws: Draws) -> Assembly:
     """Scissors, closed at rest. One blade turns about the vertical pivot."""
-    length = draws.length("length", (0.09, 0.3))
-    blade = length * draws.number("blade_length", (0.36, 0.6))
-    width = min(max(blade * draws.number("blade_width", (0.09, 0.19)), 0.006), 0.024)
+    length = draws.length("length", (0.09, 0.3), (0.08, 0.33))  # from scissors for nails to tailors' shears
+    blade = length * draws.number("blade_length", (0.36, 0.6), (0.3, 0.66))
+    width = min(max(blade * draws.number("blade_width", (0.09, 0.19), (0.07, 0.24)), 0.005), 0.028)
     sheet = max(length * draws.number("blade_thickness", (0.008, 0.013)), 0.0016)
     plastic = draws.chance("plastic", 0.6)
     bar = length * draws.number("bar_width", (0.026, 0.046) if plastic else (0.014, 0.024))
     height = bar * draws.number("bar_height", (0.8, 1.3)) if plastic else max(bar, 2.6 * sheet)
     reach = length - blade
     kind = draws.pick("rings", {"same": 0.4, "long": 0.4, "offset": 0.2})
-    rings = [Ring(draws.within("ring"), reach, bar, kind, second, plastic) for second in (False, True)]
+    slope = tan(draws.angle("ring_slope", (0.1, 0.5))) if draws.chance("bent_handles", 0.12) else 0.0
+    front = 0.6 * width + 0.7 * bar  # clear of the other blade's tang
+    ringed = draws.within("ring")
+    rings = [Ring(ringed, front, reach, bar, kind, second, plastic, slope) for second in (False, True)]
     if kind == "same":
         rings[1] = rings[0]
     point = _blade(draws, blade, width)
@@ -115,12 +130,11 @@ def _handle(
 ) -> Solid:
     """Ring and the shank that joins it to the pivot; half as thick as both blades near the pivot."""
     middle, tang = sheet + GAP / 2, 0.42 * width
-    loop = ring.loop()
-    path = np.column_stack([loop[:, 0], side * loop[:, 1], np.full(len(loop), middle)])
+    path = ring.loop() * (1.0, side, 1.0) + (0.0, 0.0, middle)
     sections = _sections(path, bar, height)
     solid = loft(sections, closed=True)
     # The shank meets the ring where it comes nearest to the pivot.
-    k = int(np.argmin(norm(loop)))
+    k = int(np.argmin(norm(path[:, :2])))
     near, top = path[k], low + sheet
     rear = np.array([(x, side * y) for x in (-0.3, -0.2) for y in (-0.78, 0.2)]) * width
     end = rod(near[0], near[1], (low, top), 0.5 * bar, sections=16)
@@ -147,10 +161,10 @@ def _clear_opening(handle: Solid, low: float, high: float, width: float) -> floa
 
 
 def _sections(path: Array, width: float, height: float) -> list[Array]:
-    """Elliptic cross-sections of a level closed bar."""
+    """Elliptic upright cross-sections of a closed bar."""
     center = path.mean(axis=0)
     angles = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False) + np.pi / 8
-    ahead = np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0)
+    ahead = (np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0)) * (1.0, 1.0, 0.0)
     sections = []
     for point, along in zip(path, ahead, strict=True):
         out = np.array([along[1], -along[0], 0.0]) / norm(along)
@@ -166,5 +180,5 @@ def _finger_rest(ring: Ring, length: float, bar: float, middle: float) -> Solid:
     loop = ring.loop()
     start = loop[np.argmax(loop[:, 0])]
     share = np.linspace(0.0, 1.0, 6)
-    path = np.column_stack([start[0] + length * share, start[1] + 0.5 * length * np.square(share), np.full(6, middle)])
-    return tube(path, list(0.35 * bar * (1 - 0.3 * share)), 8)
+    behind = np.column_stack([share, 0.5 * np.square(share), np.zeros(6)])
+    return tube(start + length * behind + (0.0, 0.0, middle), list(0.35 * bar * (1 - 0.3 * share)), 8)
