@@ -48,11 +48,6 @@ class Front:
         self.thickness = _mm(draws, "temple_thickness", *((2.4, 4.2) if flat else (1.8, 2.6)))
         self.barrel = _mm(draws, "barrel_radius", 1.0, 1.4)  # of the hinges; 0 for those without knuckles
 
-    @property
-    def slim(self) -> bool:
-        """Whether temples are slim, on hinges without knuckles."""
-        return self.barrel == 0.0
-
     def x(self, y: Array | float) -> Array:
         """Middle surface of the front over y."""
         depth: Array = self.wrap * np.square(np.asarray(y) / self.half) - self.ahead
@@ -279,7 +274,7 @@ def _plate_corner(front: Front, outline: Array, depth: float) -> Solid:
 
 def _hinge(front: Front) -> tuple[Solid, Solid]:
     """Knuckles on the axis of the hinge at +y: the frame's, above and below, and the temple's between them."""
-    if front.slim:
+    if front.barrel == 0.0:
         return Solid(), Solid()
     half, b = 0.5 * max(min(0.8 * front.height, 6.0 * MM), 3.6 * MM), front.barrel
     third = half / 3
@@ -299,7 +294,7 @@ def _temple(draws: Draws, front: Front, bend: float, flat: bool) -> Solid:
     x = np.concatenate([np.linspace(GAP, 0.6 * length, 4), np.linspace(0.68, 1.0, 8) * length])
     share = np.clip(x / length - draws.number("bend_start", (0.66, 0.74)), 0, 1)
     z = -bend * power(share / share[-1], draws.number("bend_sharpness", (1.2, 1.8)))
-    bow = _mm(draws, "temple_bow", 0.0, 3.0) * (0.2 if front.slim else 1.0)
+    bow = _mm(draws, "temple_bow", 0.0, 3.0) * (0.2 if front.barrel == 0.0 else 1.0)
     y = front.barrel + 0.5 * front.thickness - bow * np.square(x / length)
     waist = draws.number("temple_waist", (0.45, 0.95)) if flat else 0.8
     heights = front.height * (1 - (1 - waist) * np.clip(x / (0.55 * length), 0, 1))
@@ -309,7 +304,7 @@ def _temple(draws: Draws, front: Front, bend: float, flat: bool) -> Solid:
     if not flat and draws.chance("temple_sleeves", 0.8):  # over the end of the wire
         sleeve = x > 0.64 * length
         heights = np.where(sleeve, 4.0 * MM, heights)
-        thick = thick if front.slim else np.where(sleeve, 2.8 * MM, thick)
+        thick = thick if front.barrel == 0.0 else np.where(sleeve, 2.8 * MM, thick)
     heights[-1] *= 0.75
     slopes = np.gradient(z, x)
     slopes[0] = 0.0

@@ -4,14 +4,17 @@ Joints turn across the links (bends), along them (rolls) or slide (telescopes, r
 varies: the order of the joints, lengths, thickness, the shape of links, the side that each bend steps to, the tool.
 """
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from artsim.common.products import apply, matmul
 from artsim.families.clearance import Link, narrow_limits
-from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, prismatic, revolute, swivel
 from artsim.making.draws import Draws
-from artsim.making.outlines import rounded_rectangle
-from artsim.making.solids import box, cylinder, hull, hull_of, ring, union
+from artsim.making.outlines import Span, rounded_rectangle
+from artsim.making.solids import Solid, box, cylinder, hull, hull_of, ring, union
 from artsim.model.kinematics import Array
 from artsim.model.transforms import rotation_about
 
@@ -23,6 +26,8 @@ ARMS = (
     "YPRPRP", "YPRPRPR", "YPRPPRP", "YPRPSRPR", "YPRPRPRP",
 )  # fmt: skip
 SCARAS = ("PPS", "PPSR", "PPPS", "PPPSR")
+BEAM = rounded_rectangle((-1, -1), (1, 1), 0.3, 2)
+"""Section of a square beam, its edges broken."""
 STOOP = {"shoulder_rest": (-25, 40), "elbow_rest": (40, 100), "wrist_rest": (10, 60)}
 """Degrees by which the first three bends of an arm lean forward at rest."""
 
@@ -47,13 +52,9 @@ class _Chain:
     def link(self) -> Link:
         return self.links[-1]
 
-    def begin(self, joint: JointSpec) -> None:
+    def begin(self, joint: Callable[..., JointSpec], *details: Any) -> None:
         """Start the next link, on a joint to this one."""
-        self.links.append(Link(f"link_{len(self.links)}", joint))
-
-    @property
-    def name(self) -> str:
-        return self.link.name
+        self.links.append(Link(f"link_{len(self.links)}", joint(self.link.name, *details)))
 
     def limb(self, length: float, end_radius: float, plate: bool = False) -> None:
         """Go on along the link: a tube, a beam or, between two bends, a plate with round ends."""
@@ -65,7 +66,10 @@ class _Chain:
             self.link.solid += hull_of(*discs)
             self.link.guard(self.at - r * self.along, end + end_radius * self.along, r)
         elif self.square and length > 3 * r:
-            self._beam(self.at, end, 0.72 * r, 0.72 * end_radius)
+            a, b = 0.72 * r, 0.72 * end_radius
+            square = matmul(BEAM, [np.cross(self.lateral, self.along), self.lateral])
+            self.link.solid += hull(np.concatenate([self.at + a * square, end + b * square]))
+            self.link.guard(self.at, end, 1.2 * max(a, b))
         else:
             self.link.rod(self.at, end, 0.86 * r, 0.86 * end_radius)
             if self.collars and length > 3 * r:
@@ -73,22 +77,13 @@ class _Chain:
                 self.link.solid += cylinder(spot, spot + 0.25 * r * self.along, 0.97 * r, sections=20)
         self.at, self.radius = end, end_radius
 
-    def _beam(self, start: Array, end: Array, half: float, end_half: float) -> None:
-        """Tapering beam of square section with broken edges."""
-        outline = matmul(
-            rounded_rectangle((-1, -1), (1, 1), 0.3, 2), [np.cross(self.lateral, self.along), self.lateral]
-        )
-        self.link.solid += hull(np.concatenate([start + half * outline, end + end_half * outline]))
-        self.link.guard(start, end, 1.2 * max(half, end_half))
-
     def roll(self, spin: bool = False) -> None:
         """Joint about the link's direction, between two round flanges."""
         r = self.radius
         self.link.rod(self.at - 0.02 * r * self.along, self.at + 0.5 * r * self.along, r)
         face = self.at + 0.5 * r * self.along
         limit = np.deg2rad(self.draws.degrees("roll_angle", (120, 175)))
-        about = self.name, self.along, face
-        self.begin(continuous(*about) if spin else revolute(*about, -limit, limit))
+        self.begin(swivel, self.along, face, None if spin else limit)
         self.link.narrowing = 0.97
         self.widest = r
         self.at = face + GAP * self.along
@@ -105,7 +100,7 @@ class _Chain:
         self.link.rod(self.at - (half - cap) * step, self.at + half * step, r)
         self.link.solid += cylinder(self.at - half * step, self.at, 0.75 * r, sections=20)
         center = self.at + (half + GAP) * step
-        self.begin(revolute(self.name, self.lateral, center, *reach))
+        self.begin(revolute, self.lateral, center, *reach)
         self.radius = radius
         half = self.widest = radius
         self.link.rod(center, center + (2 * half - cap) * step, r)
@@ -121,7 +116,7 @@ class _Chain:
         self.link.solid += cylinder(self.at - 0.3 * r * d, self.at + 0.2 * r * d, r, sections=20)
         self.link.guard(self.at, self.at + depth * d, r)
         mouth = self.at + depth * d
-        self.begin(prismatic(self.name, d, 0.0, travel, mouth))
+        self.begin(prismatic, d, 0.0, travel, mouth)
         inner = bore - GAP
         self.link.rod(mouth - min(depth - 0.3 * r, travel + 0.2 * depth) * d, mouth + 0.6 * r * d, inner)
         self.at, self.radius = mouth + 0.3 * r * d, 0.9 * r
@@ -210,24 +205,20 @@ def _base(chain: _Chain, reach: float) -> None:
 def _rail(chain: _Chain, reach: float) -> None:
     """A linear axis under the arm: a beam, and a carriage that slides along it."""
     draws, r = chain.draws, chain.radius
-    axis = {"x": 0, "y": 1}[draws.pick("rail_axis", ["x", "y"])]
-    other = 1 - axis
+    axis = draws.pick("rail_axis", ["x", "y"])
+    direction = np.eye(3)["xy".index(axis)]
     half, travel = 1.6 * r, reach * draws.number("rail_length", (0.4, 0.9))
-    low, high = np.zeros(3), np.zeros(3)
-    low[axis], high[axis] = -half, half + travel
-    low[other], high[other] = -1.1 * r, 1.1 * r
-    high[2] = r
-    chain.link.solid += box(low, high, fillet=0.15 * r)
+    along = (-half, half + travel)
+
+    def beam(across: Span, z: Span, fillet: float | None = None) -> Solid:
+        return box(along, across, z, fillet=fillet) if axis == "x" else box(across, along, z, fillet=fillet)
+
+    chain.link.solid += beam(1.1 * r, (0, r), 0.15 * r)
     for side in (-0.7, 0.7):
-        a, b = low.copy(), high.copy()
-        a[other], b[other] = (side - 0.15) * r, (side + 0.15) * r
-        a[2], b[2] = 0.9 * r, 1.15 * r
-        chain.link.solid += box(a, b)
-    ends = np.array([low, high])
-    ends[:, other], ends[:, 2] = 0.0, 0.5 * r
-    chain.link.guard(ends[0], ends[1], 1.25 * r)
-    direction = np.eye(3)[axis]
-    chain.begin(prismatic(chain.name, direction, 0.0, travel, (0, 0, 1.15 * r)))
+        chain.link.solid += beam(((side - 0.15) * r, (side + 0.15) * r), (0.9 * r, 1.15 * r))
+    start, end = (share * direction + (0, 0, 0.5 * r) for share in along)
+    chain.link.guard(start, end, 1.25 * r)
+    chain.begin(prismatic, direction, 0.0, travel, (0, 0, 1.15 * r))
     bottom = 1.15 * r + GAP
     chain.link.solid += box(half, half, (bottom, bottom + 0.5 * r), fillet=0.1 * r)
     chain.link.guard((0, 0, bottom), (0, 0, bottom + 0.5 * r), 1.8 * r)
@@ -269,7 +260,7 @@ def _quill(chain: _Chain, height: float) -> None:
     chain.link.solid += ring(middle, down, bore, r, top - bottom, 20)
     chain.link.guard(center + (0, 0, bottom), center + (0, 0, top), r)
     mouth = center + (0, 0, bottom)
-    chain.begin(prismatic(chain.name, down, 0.0, travel, mouth))
+    chain.begin(prismatic, down, 0.0, travel, mouth)
     chain.link.rod(center + (0, 0, top + travel), mouth + 1.9 * r * down, bore - GAP)
     chain.along, chain.lateral, chain.radius = down, np.array([0.0, 1.0, 0.0]), 0.8 * r
     chain.at = mouth + 1.8 * r * down
@@ -319,4 +310,4 @@ def _fingers(arm: Assembly, chain: _Chain, half: float) -> None:
         )
         travel = half - inner - 1.6 * thick
         mimic = ("finger_0", 1.0) if number else None
-        arm.add(f"finger_{number}", finger, prismatic(chain.name, side * u, 0.0, travel, chain.at, mimic=mimic))
+        arm.add(f"finger_{number}", finger, prismatic(chain.link.name, side * u, 0.0, travel, chain.at, mimic=mimic))
