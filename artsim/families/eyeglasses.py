@@ -136,7 +136,7 @@ def _outline(draws: Draws) -> Array:
     return np.stack([a * y, b * z], axis=1)
 
 
-def _chains(outline: Array, y: Array) -> tuple[Array, Array]:
+def _chains(outline: Array, y: Array | float) -> tuple[Array, Array]:
     """Lower and upper z of the outline over y."""
     turned = np.roll(outline, -int(np.argmax(outline[:, 0])), axis=0)
     half = int(np.argmin(turned[:, 0]))
@@ -168,7 +168,7 @@ def _glass(draws: Draws, style: str, outline: Array, front: Front, rim: float, d
     if style == "shield":
         edge = inner + 0.3 * (outer - inner)
         y = np.linspace(-edge, edge, 9)
-        top = float(_chains(outline, np.array([edge]))[1][0])
+        top = float(_chains(outline, edge)[1])
         span = top - outline[:, 1].min()
         nose = top - span * (draws.number("nose_notch", (0.25, 0.4)) + 0.5 * np.square(y / edge))
         solid += _sheet(front, y, nose, np.full(9, top), 1.8 * MM).called("glass", FRONT)
@@ -188,12 +188,8 @@ def _rim(front: Front, points: Array, width: float, depth: float, closed: bool) 
         steps[0], steps[-1] = points[1] - points[0], points[-1] - points[-2]
     normals = np.stack([steps[:, 1], -steps[:, 0]], axis=1) / norm(steps)[:, None]
     section = _octagon(0.5 * width + 0.4 * MM, 0.5 * depth) + (0.5 * width - 0.4 * MM, 0.0)
-    x = front.x(points[:, 0])
-    rings = []
-    for k in range(len(points)):
-        flat = points[k] + section[:, :1] * normals[k]
-        rings.append(np.column_stack([x[k] + section[:, 1], flat]))
-    return loft(rings, closed)
+    flat = points[:, None] + section[:, :1] * normals[:, None]
+    return loft(list(np.dstack([front.x(points[:, 0])[:, None] + section[:, 1], flat])), closed)
 
 
 def _octagon(a: float, b: float) -> Array:
@@ -245,10 +241,7 @@ def _nose_pads(draws: Draws, style: str, outline: Array, front: Front, rim: floa
 
 def _edge(outline: Array, z: float, outer: bool) -> float:
     """y of the outline's outer or inner side at a height."""
-    y, middle = outline[:, 0], np.median(outline[:, 0])
-    side = outline[y > middle if outer else y < middle]
-    side = side[np.argsort(side[:, 1], kind="stable")]
-    return float(np.interp(z, side[:, 1], side[:, 0]))
+    return float(_chains(outline[:, ::-1], z)[0 if outer else 1])
 
 
 @deferred
