@@ -10,10 +10,9 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.common.elementary import arcsin, cos, hypot, power, sin
-from artsim.common.products import norm
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, about
+from artsim.making.outlines import FRONT, about, normals
 from artsim.making.solids import Solid, box, deferred, ellipsoid, hull, hull_of, loft, rod, tube, union
 from artsim.model.kinematics import Array
 
@@ -183,12 +182,8 @@ def _glass(draws: Draws, style: str, outline: Array, front: Front, rim: float, d
 @deferred
 def _rim(front: Front, points: Array, width: float, depth: float, closed: bool) -> Solid:
     """Bar of rounded section along an outline; reaches inwards over the lens's edge."""
-    steps = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
-    if not closed:
-        steps[0], steps[-1] = points[1] - points[0], points[-1] - points[-2]
-    normals = np.stack([steps[:, 1], -steps[:, 0]], axis=1) / norm(steps)[:, None]
     section = _octagon(0.5 * width + 0.4 * MM, 0.5 * depth) + (0.5 * width - 0.4 * MM, 0.0)
-    flat = points[:, None] + section[:, :1] * normals[:, None]
+    flat = points[:, None] + section[:, :1] * normals(points, closed)[:, None]
     return loft(list(np.dstack([front.x(points[:, 0])[:, None] + section[:, 1], flat])), closed)
 
 

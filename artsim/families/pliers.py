@@ -7,10 +7,9 @@ grips (bare, dipped, thick with a guard), the rivet, and how far they open.
 import numpy as np
 
 from artsim.common.elementary import power, sin
-from artsim.common.products import norm
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import strips
+from artsim.making.outlines import normals, strips
 from artsim.making.solids import Solid, box, cylinder, deferred, hull_of, loft, prism, rod, union
 from artsim.model.kinematics import Array
 
@@ -113,11 +112,6 @@ def _handle(path: Array, radii: Array, thick: float, covered: bool, guard: bool,
 
 def _bar(path: Array, half_width: Array, half_height: Array, middle: float) -> Solid:
     """Bar of octagonal section along a level path."""
-    along = np.gradient(path, axis=0)
-    across = np.stack([along[:, 1], -along[:, 0]], axis=1) / norm(along)[:, None]
     corners = np.array([(1, 0.5), (0.6, 1), (-0.6, 1), (-1, 0.5), (-1, -0.5), (-0.6, -1), (0.6, -1), (1, -0.5)])
-    rings = []
-    for point, u, w, h in zip(path, across, half_width, half_height, strict=True):
-        flat = point + corners[:, :1] * w * u
-        rings.append(np.column_stack([flat, middle + corners[:, 1] * h]))
-    return loft(rings)
+    flat = path[:, None] + corners[:, :1] * half_width[:, None, None] * normals(path)[:, None]
+    return loft(list(np.dstack([flat, middle + corners[:, 1] * half_height[:, None]])))

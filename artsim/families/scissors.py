@@ -11,10 +11,10 @@ the pivot.
 import numpy as np
 
 from artsim.common.elementary import arcsin, arctan2, cos, hypot, sin, tan
-from artsim.common.products import dot, matmul, norm
+from artsim.common.products import matmul, norm
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import strips
+from artsim.making.outlines import normals, strips
 from artsim.making.solids import Solid, deferred, ellipsoid, hull, hull_of, loft, prism, rod, tube, union
 from artsim.model.kinematics import Array
 
@@ -131,7 +131,10 @@ def _handle(
     """Ring and the shank that joins it to the pivot; half as thick as both blades near the pivot."""
     middle, tang = sheet + GAP / 2, 0.42 * width
     path = ring.loop() * (1.0, side, 1.0) + (0.0, 0.0, middle)
-    sections = _sections(path, bar, height)
+    angles = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False) + np.pi / 8
+    out = side * normals(path[:, :2], closed=True)
+    flat = path[:, None, :2] + (0.54 * bar * cos(angles))[:, None] * out[:, None]
+    sections = list(np.dstack([flat, path[:, 2:] + 0.54 * height * sin(angles)]))  # upright ellipses
     solid = loft(sections, closed=True)
     # The shank meets the ring where it comes nearest to the pivot.
     k = int(np.argmin(norm(path[:, :2])))
@@ -158,20 +161,6 @@ def _clear_opening(handle: Solid, low: float, high: float, width: float) -> floa
     away = hypot(thick[:, 0], thick[:, 1])
     turned = np.abs(arctan2(thick[:, 1], thick[:, 0])) + arcsin(np.minimum(1.0, 0.9 * width / away))
     return float(np.pi - turned.max() - 0.05)
-
-
-def _sections(path: Array, width: float, height: float) -> list[Array]:
-    """Elliptic upright cross-sections of a closed bar."""
-    center = path.mean(axis=0)
-    angles = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False) + np.pi / 8
-    ahead = (np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0)) * (1.0, 1.0, 0.0)
-    sections = []
-    for point, along in zip(path, ahead, strict=True):
-        out = np.array([along[1], -along[0], 0.0]) / norm(along)
-        out *= np.sign(dot(out, point - center))
-        radial = 0.54 * width * cos(angles)
-        sections.append(point + radial[:, None] * out + (0.54 * height * sin(angles))[:, None] * (0, 0, 1))
-    return sections
 
 
 @deferred

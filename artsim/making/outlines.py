@@ -6,7 +6,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.common.elementary import power as raised
-from artsim.common.products import unit
+from artsim.common.products import norm, unit
 from artsim.model.kinematics import Array
 
 Vector = Sequence[float] | Array
@@ -66,6 +66,13 @@ def rounded_rectangle(low: Vector, high: Vector, radius: float, steps: int = 4) 
 def strips(first: Array, second: Array) -> list[Array]:
     """Convex outlines that fill what lies between two edges, (N, 2) points each."""
     return [np.concatenate([first[k : k + 2], second[k : k + 2]]) for k in range(len(first) - 1)]
+
+
+def normals(path: Array, closed: bool = False) -> Array:
+    """(N, 2) unit vectors to the right of a path of (N, 2) points, at each of them."""
+    steps = np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0) if closed else np.gradient(path, axis=0)
+    right: Array = np.stack([steps[:, 1], -steps[:, 0]], axis=1) / norm(steps)[:, None]
+    return right
 
 
 def superellipse(power: float, x: float, y: float, count: int) -> Array:
