@@ -5,7 +5,7 @@ length, width, thickness and outline of the body (rectangle, oval, tapered, wais
 and hinged bails; a switch on the side.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,22 +20,15 @@ GAP = 0.0004
 
 
 @dataclass(frozen=True)
-class _Plug:
-    """Connector: how far it stands out, half its width and half its thickness."""
-
-    reach: float
-    half: float
-    thick: float
-
-
-@dataclass(frozen=True)
 class _Stick:
-    """Body from x = 0 to ``length``; half its width and half its thickness."""
+    """Body from x = 0 to ``length``, half its width and half its thickness; its plug, which stands out by ``reach``."""
 
     length: float
     half: float
     thick: float
-    plug: _Plug
+    reach: float
+    plug: Array
+    """(2,) half its width and half its thickness."""
 
 
 _PLUGS = {"A": (0.0135, 0.006, 0.00225), "C": (0.0075, 0.0042, 0.00125), "micro": (0.0065, 0.0034, 0.0009)}
@@ -47,10 +40,10 @@ def build(draws: Draws) -> Assembly:
     scale = draws.number("scale", (0.75, 1.9))  # novelty sticks are larger than their connectors ask for
     measures = _PLUGS[draws.pick("plug", {"A": 0.7, "C": 0.2, "micro": 0.1})]
     sides = zip(("length", "width", "thickness"), measures, strict=True)
-    plug = _Plug(*(v * scale * draws.number(f"plug_{name}", (0.9, 1.15)) for name, v in sides))
-    half = plug.half * draws.number("width", (1.25, 2.6))
-    thick = plug.thick * draws.triangular("height", 1.4, 1.9, 4.2)
-    stick = _Stick(plug.reach * draws.number("length", (1.1, 4.2)), half, thick, plug)
+    reach, *plug = (v * scale * draws.number(f"plug_{name}", (0.9, 1.15)) for name, v in sides)
+    half = plug[0] * draws.number("width", (1.25, 2.6))
+    thick = plug[1] * draws.triangular("height", 1.4, 1.9, 4.2)
+    stick = _Stick(reach * draws.number("length", (1.1, 4.2)), half, thick, reach, np.array(plug))
     usb = Assembly(density=1200.0)
     kinds = {"capped": _capped, "two_caps": _two_caps, "swivel": _swivel, "sleeve": _sleeved, "retracting": _retracting}
     kind = draws.pick("kind", dict(zip(kinds, (0.3, 0.1, 0.28, 0.14, 0.18), strict=True)))
@@ -59,14 +52,15 @@ def build(draws: Draws) -> Assembly:
 
 
 @deferred
-def _plug(plug: _Plug, x: float, sign: float = -1.0) -> Solid:
+def _plug(stick: _Stick, x: float, sign: float = -1.0) -> Solid:
     """Connector that stands out from a plane at x towards -X (sign -1) or +X: a shell around a tongue."""
-    wall = 0.14 * plug.thick
-    first, last = sorted((x - sign * 0.002, x + sign * plug.reach))
-    outer, hole = np.array([plug.half, plug.thick]), np.array([plug.half - wall, plug.thick - wall])
-    solid = sleeve((first, *-outer), (last, *outer), -hole, hole, 0.2 * plug.thick, 1)
-    tongue = x - sign * 0.002, x + sign * 0.93 * plug.reach
-    return solid + box(tongue, plug.half - 0.5 * wall, (-0.05 * plug.thick, 0.5 * plug.thick))
+    half, thick = stick.plug
+    wall = 0.14 * thick
+    first, last = sorted((x - sign * 0.002, x + sign * stick.reach))
+    hole = stick.plug - wall
+    solid = sleeve((first, *-stick.plug), (last, *stick.plug), -hole, hole, 0.2 * thick, 1)
+    tongue = x - sign * 0.002, x + sign * 0.93 * stick.reach
+    return solid + box(tongue, half - 0.5 * wall, (-0.05 * thick, 0.5 * thick))
 
 
 def _outline(draws: Draws, kind: str, x0: float, x1: float, half: float) -> list[Array]:
@@ -129,7 +123,7 @@ def _body(draws: Draws, stick: _Stick, x0: float, x1: float, plain: bool = False
 def _capped(draws: Draws, usb: Assembly, stick: _Stick) -> None:
     """A cap that pulls off to -X; a wire loop at the back and a small slide switch on top, on some."""
     half, thick, length = stick.half, stick.thick, stick.length
-    body = _body(draws, stick, 0.0, length) + _plug(stick.plug, 0.0)
+    body = _body(draws, stick, 0.0, length) + _plug(stick, 0.0)
     usb.add("body", body + _eyelet(draws, stick, length))
     _cap(draws, usb, stick, "cap", 0.0, -1.0)
     if draws.chance("loop", 0.25, upper=True):
@@ -148,26 +142,27 @@ def _capped(draws: Draws, usb: Assembly, stick: _Stick) -> None:
 def _two_caps(draws: Draws, usb: Assembly, stick: _Stick) -> None:
     """A connector and a cap at either end."""
     body = _body(draws, stick, 0.0, stick.length)
-    usb.add("body", body + _plug(stick.plug, 0.0) + _plug(stick.plug, stick.length, 1.0))
+    usb.add("body", body + _plug(stick, 0.0) + _plug(stick, stick.length, 1.0))
     _cap(draws, usb, stick, "cap_0", 0.0, -1.0)
     _cap(draws, usb, stick, "cap_1", stick.length, 1.0)
 
 
 def _cap(draws: Draws, usb: Assembly, stick: _Stick, name: str, x: float, sign: float) -> None:
     """A cap over the connector that stands out from the plane at x."""
-    plug, draws = stick.plug, draws.within("cap")
-    half = max(stick.half * draws.number("width", (0.85, 1.15)), 1.2 * plug.half + GAP)
-    thick = max(stick.thick * draws.number("thickness", (0.85, 1.15)), 1.3 * plug.thick + GAP)
-    inner = np.array([plug.half + GAP, plug.thick + GAP])
+    draws = draws.within("cap")
+    half = max(stick.half * draws.number("width", (0.85, 1.15)), 1.2 * stick.plug[0] + GAP)
+    thick = max(stick.thick * draws.number("thickness", (0.85, 1.15)), 1.3 * stick.plug[1] + GAP)
+    inner = stick.plug + GAP
     radius = draws.number("rounding", (0.15, 0.95)) * min(half, thick)
-    end, far = x + sign * (plug.reach + GAP), x + sign * (plug.reach + draws.number("end", (0.15, 0.9)) * plug.half)
+    end = x + sign * (stick.reach + GAP)
+    far = x + sign * (stick.reach + draws.number("end", (0.15, 0.9)) * stick.plug[0])
     first, last = sorted((x + sign * GAP, end + sign * 0.0002))
     solid = sleeve((first, -half, -thick), (last, half, thick), -inner, inner, radius, 3)
     shrink = draws.number("end_width", (0.5, 1.0))
     tips = [(end, 1.0), (0.5 * (end + far), 0.8 + 0.2 * shrink), (far, shrink)]
     rim = rounded_rectangle((-half, -thick), (half, thick), radius, 3)
     solid += hull([(a, *(s * point)) for a, s in tips for point in rim])
-    pull = plug.reach * draws.number("travel", (1.1, 2.5))
+    pull = stick.reach * draws.number("travel", (1.1, 2.5))
     usb.add(name, solid, prismatic("body", (sign, 0, 0), 0.0, pull, (x, 0, 0)), density=1100.0)
 
 
@@ -176,7 +171,7 @@ def _swivel(draws: Draws, usb: Assembly, stick: _Stick) -> None:
     half, back = stick.half, stick.length
     pivot = back - half * draws.number("pivot_place", (0.6, 1.0))
     pivot -= draws.number("pivot_inset", (0.0, 0.25)) * max(back - 2.0 * half, 0.0)
-    body = _body(draws, stick, 0.0, back, plain=draws.chance("plain", 0.6)) + _plug(stick.plug, 0.0)
+    body = _body(draws, stick, 0.0, back, plain=draws.chance("plain", 0.6)) + _plug(stick, 0.0)
     span = body.bounds()
     low, high = float(span[0, 2]) - GAP, float(span[1, 2]) + GAP
     pin = half * draws.number("pivot_radius", (0.2, 0.5))
@@ -184,9 +179,8 @@ def _swivel(draws: Draws, usb: Assembly, stick: _Stick) -> None:
     usb.add("body", body + eyelet, density=1500.0)
     sheet = draws.length("cover_thickness", (0.0006, 0.0014))
     # The bridge before the connector's end also passes the corners of the body, and the eyelet.
-    corners = np.array(
-        [(-stick.plug.reach, stick.plug.half), (0.0, half), (back + (1.5 if eyelet.pieces else 0.0) * half, half)]
-    )
+    behind = back + (1.5 if eyelet.pieces else 0.0) * half
+    corners = np.array([(-stick.reach, stick.plug[0]), (0.0, half), (behind, half)])
     reach = float(np.sqrt(np.square(corners - (pivot, 0.0)).sum(axis=1)).max()) + GAP
     tail = half * draws.number("cover_tail", (0.5, 1.0))
     wide = half * draws.number("cover_width", (0.7, 1.1))
@@ -206,21 +200,22 @@ def _swivel(draws: Draws, usb: Assembly, stick: _Stick) -> None:
 
 def _sleeved(draws: Draws, usb: Assembly, stick: _Stick) -> None:
     """A sleeve over body and connector that slides back."""
-    half, thick, plug = stick.half, stick.thick, stick.plug
-    length = max(stick.length, 1.5 * plug.reach)
-    inner = _Stick(length, half - 0.0016, thick - 0.0014, plug) if thick > plug.thick + 0.0022 else stick
-    body = _body(draws, inner, 0.0, length, plain=True) + _plug(plug, 0.0)
+    half, thick = stick.half, stick.thick
+    length = max(stick.length, 1.5 * stick.reach)
+    thinner = replace(stick, half=half - 0.0016, thick=thick - 0.0014)
+    inner = thinner if thick > stick.plug[1] + 0.0022 else stick
+    body = _body(draws, inner, 0.0, length, plain=True) + _plug(stick, 0.0)
     grip = draws.number("grip_length", (0.12, 0.3)) * length
     start = length - grip
-    travel = plug.reach * draws.number("sleeve_travel", (0.9, 1.1))
+    travel = stick.reach * draws.number("sleeve_travel", (0.9, 1.1))
     end = start - GAP
     # Behind the sleeve is a grip that is thinner than the sleeve's hole, so that the sleeve slides over it.
     body += _body(draws.within("grip"), inner, start, length + travel - grip + 0.004, plain=True)
     usb.add("body", body, density=1300.0)
-    hole = np.array([max(inner.half, plug.half) + GAP, max(inner.thick, plug.thick) + GAP])
+    hole = np.maximum([inner.half, inner.thick], stick.plug) + GAP
     outer = hole + draws.length("sleeve_wall", (0.0009, 0.003))
     radius = draws.number("sleeve_rounding", (0.2, 0.95)) * float(outer.min())
-    shell = sleeve((-plug.reach, *-outer), (end, *outer), -hole, hole, radius, 3)
+    shell = sleeve((-stick.reach, *-outer), (end, *outer), -hole, hole, radius, 3)
     if draws.chance("sleeve_ribs", 0.5):
         x = end - 0.2 * length
         shell += union(box((x + d, -0.5 * half, outer[1] - 0.0003), (x + d + 0.0012, 0.5 * half, outer[1] + 0.0008))
@@ -230,19 +225,18 @@ def _sleeved(draws: Draws, usb: Assembly, stick: _Stick) -> None:
 
 def _retracting(draws: Draws, usb: Assembly, stick: _Stick) -> None:
     """A connector on a slider with a knob, inside a hollow body: it comes out to -X."""
-    plug = stick.plug
     wall = draws.length("wall", (0.0012, 0.0022))
-    inner = np.array([max(plug.half + GAP, stick.half - wall), plug.thick + 0.0008 + GAP])
+    inner = np.array([max(stick.plug[0] + GAP, stick.half - wall), stick.plug[1] + 0.0008 + GAP])
     half, thick = inner[0] + wall, inner[1] + wall * draws.number("roof", (1.0, 2.2))
-    carriage = plug.reach * draws.number("carriage_length", (0.6, 1.2))
-    length = 2.0 * plug.reach + carriage + 2.0 * wall
+    carriage = stick.reach * draws.number("carriage_length", (0.6, 1.2))
+    length = 2.0 * stick.reach + carriage + 2.0 * wall
     slot = inner[0] * draws.number("slot_width", (0.25, 0.45))
     back = length - wall
     radius = draws.number("rounding", (0.2, 0.95)) * min(half, thick)
     rim = rounded_rectangle((-half, -thick), (half, thick), radius, 3)
-    knob_start = plug.reach + 0.15 * carriage
+    knob_start = stick.reach + 0.15 * carriage
     knob_end = knob_start + draws.number("knob_length", (0.5, 0.8)) * carriage
-    first, last = knob_start - plug.reach - 2 * GAP, knob_end + 2 * GAP
+    first, last = knob_start - stick.reach - 2 * GAP, knob_end + 2 * GAP
     solid = box((0, -half, -thick), (back, half, -inner[1])) if radius < 0.3 * thick else prism(
         np.column_stack([rim[:, 0], np.minimum(rim[:, 1], -inner[1])]), 0.0, back, 0)  # fmt: skip
     for s in (-1.0, 1.0):
@@ -254,16 +248,16 @@ def _retracting(draws: Draws, usb: Assembly, stick: _Stick) -> None:
     top = np.array([(y, z) for y in (-slot - 1e-4, slot + 1e-4) for z in (inner[1], thick)])
     solid += prism(top, 0.0, max(first, 0.0005), 0) + prism(top, last, back, 0)
     solid += prism(rim, back - 1e-4, length, 0)
-    usb.add("body", solid + _eyelet(draws, _Stick(length, half, thick, plug), length))
-    slider = _plug(plug, plug.reach)
+    usb.add("body", solid + _eyelet(draws, replace(stick, half=half, thick=thick), length))
+    slider = _plug(stick, stick.reach)
     low = inner - GAP
-    slider += box((plug.reach, *-low), (plug.reach + carriage, *low))
+    slider += box((stick.reach, *-low), (stick.reach + carriage, *low))
     knob_top = thick + draws.length("knob_height", (0.0006, 0.003))
     slider += box((knob_start, knob_end), slot - GAP, (0, knob_top))
     across = (-draws.number("knob_width", (0.8, 1.6)) * slot, draws.number("knob_width", (0.8, 1.6)) * slot)
     knob = box((knob_start, knob_end), across, (thick + GAP, knob_top + 0.0006), fillet=0.001, axis=2)
     slider += knob.called("knob", UP)
-    usb.add("connector", slider, prismatic("body", FRONT, 0.0, plug.reach, (plug.reach, 0, 0)), density=2000.0)
+    usb.add("connector", slider, prismatic("body", FRONT, 0.0, stick.reach, (stick.reach, 0, 0)), density=2000.0)
 
 
 def _eyelet(draws: Draws, stick: _Stick, x: float) -> Solid:
