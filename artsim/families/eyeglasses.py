@@ -135,7 +135,7 @@ def _outline(draws: Draws) -> Array:
     return np.stack([a * y, b * z], axis=1)
 
 
-def _chains(outline: Array, y: Array | float) -> tuple[Array, Array]:
+def _chains(outline: Array, y: Array) -> tuple[Array, Array]:
     """Lower and upper z of the outline over y."""
     turned = np.roll(outline, -int(np.argmax(outline[:, 0])), axis=0)
     half = int(np.argmin(turned[:, 0]))
@@ -167,7 +167,7 @@ def _glass(draws: Draws, style: str, outline: Array, front: Front, rim: float, d
     if style == "shield":
         edge = inner + 0.3 * (outer - inner)
         y = np.linspace(-edge, edge, 9)
-        top = float(_chains(outline, edge)[1])
+        top = float(_chains(outline, np.array(edge))[1])
         span = top - outline[:, 1].min()
         nose = top - span * (draws.number("nose_notch", (0.25, 0.4)) + 0.5 * np.square(y / edge))
         solid += _sheet(front, y, nose, np.full(9, top), 1.8 * MM).called("glass", FRONT)
@@ -236,7 +236,7 @@ def _nose_pads(draws: Draws, style: str, outline: Array, front: Front, rim: floa
 
 def _edge(outline: Array, z: float, outer: bool) -> float:
     """y of the outline's outer or inner side at a height."""
-    return float(_chains(outline[:, ::-1], z)[0 if outer else 1])
+    return float(_chains(outline[:, ::-1], np.array(z))[0 if outer else 1])
 
 
 @deferred
