@@ -6,7 +6,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.common.elementary import power as raised
-from artsim.common.products import norm, unit
+from artsim.common.products import unit
 from artsim.model.kinematics import Array
 
 Vector = Sequence[float] | Array
@@ -71,8 +71,7 @@ def strips(first: Array, second: Array) -> list[Array]:
 def normals(path: Array, closed: bool = False) -> Array:
     """(N, 2) unit vectors to the right of a path of (N, 2) points, at each of them."""
     steps = np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0) if closed else np.gradient(path, axis=0)
-    right: Array = np.stack([steps[:, 1], -steps[:, 0]], axis=1) / norm(steps)[:, None]
-    return right
+    return unit(np.stack([steps[:, 1], -steps[:, 0]], axis=1))
 
 
 def superellipse(power: float, x: float, y: float, count: int) -> Array:
