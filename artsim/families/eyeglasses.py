@@ -170,7 +170,7 @@ def _glass(draws: Draws, style: str, outline: Array, front: Front, rim: float, d
         top = float(_chains(outline, np.array(edge))[1])
         span = top - outline[:, 1].min()
         nose = top - span * (draws.number("nose_notch", (0.25, 0.4)) + 0.5 * np.square(y / edge))
-        solid += _sheet(front, y, nose, np.full(9, top), 1.8 * MM).called("glass", FRONT)
+        solid = (solid + _sheet(front, y, nose, np.full(9, top), 1.8 * MM)).called("glass", FRONT)
         if draws.chance("brow", 0.6):
             y = np.linspace(-outer, outer, 15)
             brow = np.where(np.abs(y) < edge, top, _chains(outline, np.clip(np.abs(y), edge, 0.97 * outer))[1])
