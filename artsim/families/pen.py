@@ -79,7 +79,7 @@ def _barrel(draws: Draws, low: float, high: float, first: float, last: float) ->
 
 def _tip(draws: Draws, section: _Section, radius: float, length: float) -> Solid:
     """What writes, from z = 0 up to where its neck is ``radius`` wide: a cone, a nib, a felt block or a ball."""
-    kind = draws.pick("tip", {"cone": 0.45, "nib": 0.15, "felt": 0.2, "stub": 0.2})
+    kind = draws.pick("point", {"cone": 0.45, "nib": 0.15, "felt": 0.2, "stub": 0.2})
     neck = (radius, length + 0.0002)
     if kind == "nib":
         flat = [(-0.6 * radius, length), (0.6 * radius, length), (0.0, 0.0)]
@@ -89,7 +89,7 @@ def _tip(draws: Draws, section: _Section, radius: float, length: float) -> Solid
         felt = section.rod([(0.5 * radius, 0.0), (0.55 * radius, 0.45 * length)])
         return felt + section.rod([(0.8 * radius, 0.4 * length), neck])
     point = 0.12 * radius if kind == "cone" else 0.3 * radius
-    bend = draws.number("tip_bend", (0.45, 0.75))
+    bend = draws.number("point_bend", (0.45, 0.75))
     return section.rod([(point, 0.0), (bend * radius, 0.5 * length), neck])
 
 
@@ -119,7 +119,7 @@ def _capped(draws: Draws, section: _Section, length: float, radius: float, turni
     outer = radius * (1.0 if flush else draws.number("cap_width", (1.04, 1.25)))
     inner = outer - wall
     neck = inner - GAP - 0.02 * radius
-    tip = min(covered * draws.number("tip_length", (0.3, 0.7)), 5.0 * radius)
+    tip = min(covered * draws.number("point_length", (0.3, 0.7)), 5.0 * radius)
     body = _tip(draws, section, 0.55 * neck, tip).moved((0, 0, 0.002))
     body += section.rod([(0.55 * neck, tip + 0.002), (neck, min(tip + 0.004, covered)), (neck, covered + 0.001)])
     profile = _barrel(draws, covered, length, radius, radius * draws.number("end_width", (0.55, 1.0)))
@@ -184,7 +184,7 @@ def _double(draws: Draws, section: _Section, length: float, radius: float) -> As
 def _clicked(draws: Draws, section: _Section, length: float, radius: float) -> Assembly:
     """A button at the end, which sometimes pushes the tip out of a bore at the bottom."""
     bore = 0.22 * radius
-    cone = min(length * draws.number("tip_length", (0.08, 0.25)), 5.0 * radius)
+    cone = min(length * draws.number("point_length", (0.08, 0.25)), 5.0 * radius)
     waist = radius * draws.number("waist", (0.75, 1.0))
     mouth = max(bore + 0.1 * radius, draws.number("mouth", (0.3, 0.55)) * radius)
     profile = _barrel(draws, cone, length, waist, radius)
@@ -221,7 +221,7 @@ def _clicked(draws: Draws, section: _Section, length: float, radius: float) -> A
 def _twisted(draws: Draws, section: _Section, length: float, radius: float) -> Assembly:
     """An upper barrel that turns on the lower one, which carries the tip."""
     split = length * draws.number("split", (0.35, 0.7))
-    tip = min(length * draws.number("tip_length", (0.06, 0.2)), 5.0 * radius)
+    tip = min(length * draws.number("point_length", (0.06, 0.2)), 5.0 * radius)
     band = radius * draws.number("band_width", (1.0, 1.2))
     body = _tip(draws, section, 0.5 * radius, tip)
     body += section.rod(_barrel(draws, tip, split, 0.5 * radius, radius))
@@ -245,7 +245,7 @@ def _sliders(draws: Draws, length: float, radius: float) -> Assembly:
     """A pen of several colours: sliders in slots around its end."""
     section = _Section(_ROUND, 1.0)
     count = draws.integer("sliders", 2, 6)
-    tip = min(length * draws.number("tip_length", (0.08, 0.2)), 4.0 * radius)
+    tip = min(length * draws.number("point_length", (0.08, 0.2)), 4.0 * radius)
     start = length * draws.number("split", (0.55, 0.7))
     body = _tip(draws, section, 0.6 * radius, tip)
     body += section.rod(_barrel(draws, tip, start, 0.6 * radius, radius))
