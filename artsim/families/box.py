@@ -9,82 +9,93 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.carton import LEAST_SHARES, MOST_SHARES, carton
 from artsim.families.details import bow_handle, knob, rounded_tray
-from artsim.families.proportions import unusual_sides, with_tails
-from artsim.making.assembly import Assembly, Rng, pick, revolute
-from artsim.making.outlines import about
+from artsim.families.proportions import unusual_sides
+from artsim.making.assembly import Assembly, revolute
+from artsim.making.draws import Draws
+from artsim.making.outlines import UP, about
 from artsim.making.solids import Solid, box, frame, hull, posts, rod, tray, union
 
 GAP = 0.0015
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """A box, closed at rest."""
-    return carton(rng) if rng.random() < 0.45 else _rigid(rng)
+    return carton(draws) if draws.chance("carton", 0.45) else _rigid(draws)
 
 
-def _rigid(rng: Rng) -> Assembly:
+def _rigid(draws: Draws) -> Assembly:
     """Chest, case or jewellery box; its hinge lies behind the back, so that the lid clears it in every state."""
-    width = rng.choice([rng.uniform(0.12, 0.35), rng.uniform(0.4, 1.3)])
-    depth = width * rng.uniform(0.42, 0.8)
-    height = width * rng.uniform(0.18, 0.6)
-    if rng.random() < 0.35:
-        depth, width, height = unusual_sides(rng, LEAST_SHARES, MOST_SHARES, (0.07, 0.1, 0.05)).tolist()
-    wall = max(0.003, width * rng.uniform(0.012, 0.035))
+    small, large = draws.length("width", (0.12, 0.35)), draws.length("large_width", (0.4, 1.3))
+    width = small if draws.pick("scale", ["small", "large"]) == "small" else large
+    depth = width * draws.number("depth", (0.42, 0.8))
+    height = width * draws.number("height", (0.18, 0.6))
+    if draws.chance("unusual", 0.35):
+        depth, width, height = unusual_sides(draws, LEAST_SHARES, MOST_SHARES, (0.07, 0.1, 0.05))
+    wall = max(0.003, width * draws.number("wall", (0.012, 0.035)))
     x, y = depth / 2, width / 2
-    radius = rng.choice([0.0, rng.uniform(0.02, 0.1) * depth])
-    band = rng.choice([0.0, wall * rng.uniform(0.3, 0.6)])
+    radius = draws.number("corner_radius", (0.02, 0.1)) * depth
+    radius *= draws.pick("corners", ["square", "round"]) == "round"
+    band = wall * draws.number("band_thickness", (0.3, 0.6))
+    band *= draws.pick("edges", ["plain", "banded"]) == "banded"
     back = x + band + 0.001
     seam = height + GAP
 
-    body = _rigid_body(rng, x, y, height, wall, radius)
-    body += _bands(rng, x, y, 0.0, height, band, wall, radius)
-    body += _interior(rng, x, y, height, wall, radius)
-    body += _feet(rng, x, y, wall)
-    grips = _side_handles(rng, x, y, height) if height > 0.12 and rng.random() < 0.25 else Solid()
-    body += grips
+    body = _rigid_body(draws, x, y, height, wall, radius)
+    body += _bands(draws, x, y, 0.0, height, band, wall, radius)
+    body += _interior(draws, x, y, height, wall)
+    body += _feet(draws, x, y, wall)
+    side_handles = height > 0.12 and draws.chance("side_handles", 0.25)
+    if side_handles:
+        half, z = min(0.4 * x, 0.06), draws.number("side_handle_height", (0.55, 0.75)) * height
+        for s in (-1.0, 1.0):
+            body += bow_handle((-half, s * y, z), (half, s * y, z), (0, s, 0), 0.5 * half, 0.09 * half)
 
     chest = Assembly("body", body, 700.0)
-    halves = rng.random() < 0.12 and radius == 0.0
-    if halves:  # two lids, hinged at the left and the right
+    if draws.chance("two_lids", 0.12) and radius == 0.0:  # hinged at the left and the right
         chest.record(handles=True)
-        limit = np.deg2rad(rng.uniform(80.0, 175.0))
-        thick = wall * rng.uniform(0.6, 1.2)
+        limit = np.deg2rad(draws.degrees("lid_angle", (80.0, 175.0)))
+        thick = wall * draws.number("lid_thickness", (0.6, 1.2))
         for number, (sign, axis) in enumerate(((1, (-1, 0, 0)), (-1, (1, 0, 0)))):
             lid = box(x, (sign * y, sign * GAP), (seam, seam + thick))
             lid += knob((0, sign * 0.12 * y, seam + thick), (0, 0, 1), 0.05 * y, 0.04 * y)
             chest.add(f"lid_{number}", lid, revolute("body", axis, (0, sign * (y + band + 0.001), seam), 0.0, limit))
         return chest
-    lid, top, domed = _lid(rng, x, y, seam, height, wall, radius, band == 0.0)
-    lid += _bands(rng, x, y, seam, top, band, wall, radius) if top - seam > 3 * wall else Solid()
-    grip = Solid() if domed else _lid_handle(rng, x, y, top)
-    lid += grip
-    chest.record(handles=bool(grips.pieces or grip.pieces))
+    lid, top, domed = _lid(draws, x, y, seam, height, wall, radius, band == 0.0)
+    lid += _bands(draws, x, y, seam, top, band, wall, radius) if top - seam > 3 * wall else Solid()
+    handle = "none" if domed else draws.pick("handle", {"knob": 0.1, "bow": 0.15, "none": 0.75})
+    size = min(x, 0.5 * y, 0.12)
+    if handle == "knob":
+        lid += knob((0, 0, top), UP, 0.1 * size, 0.13 * size)
+    elif handle == "bow":
+        lid += bow_handle((0, -0.6 * size, top), (0, 0.6 * size, top), UP, 0.3 * size, 0.05 * size)
+    chest.record(handles=side_handles or handle != "none")
     barrel = max(0.002, 0.25 * wall)
     axis_x = back + barrel
-    if not domed and top - seam + 0.2 * min(x, y) < 0.7 * height and rng.random() < 0.25:
+    if not domed and top - seam + 0.2 * min(x, y) < 0.7 * height and draws.chance("rear_board", 0.25):
         # A board below that stands out at the back, under the open lid, so that the box does not tip.
-        behind = depth * rng.uniform(0.015, 0.065)
+        behind = depth * draws.number("rear_board_reach", (0.015, 0.065))
         chest.body += box((x - wall, axis_x + behind), 0.95 * (y - radius), (0.0, 0.6 * wall))
-    spans = [(-0.8, -0.6), (0.6, 0.8)] if rng.random() < 0.7 else [(-0.85, 0.85)]
+    spans = [(-0.8, -0.6), (0.6, 0.8)] if draws.chance("two_hinges", 0.7) else [(-0.85, 0.85)]
     for first, last in spans:
         lid += rod(axis_x, (first * y, last * y), seam, barrel, sections=12)
         lid += box((x - wall, axis_x), (first * y, last * y), (seam + 0.0003, seam + 0.9 * barrel))
-    limit = np.deg2rad(rng.choice([rng.uniform(75.0, 115.0), rng.uniform(115.0, 170.0)]))
+    usual, wide = draws.degrees("lid_angle", (75.0, 115.0)), draws.degrees("wide_lid_angle", (115.0, 170.0))
+    limit = np.deg2rad(usual if draws.pick("lid_opens", ["usually", "wide"]) == "usually" else wide)
     chest.add("lid", lid, revolute("body", (0, 1, 0), (axis_x, 0, seam), 0.0, limit))
-    if top - seam > 0.02 and rng.random() < 0.2:
-        _latches(rng, chest, max(x + band, -float(lid.bounds()[0, 0])), y, seam, top)
+    if top - seam > 0.02 and draws.chance("latch", 0.2):
+        _latches(draws, chest, max(x + band, -float(lid.bounds()[0, 0])), y, seam, top)
     return chest
 
 
-def _rigid_body(rng: Rng, x: float, y: float, height: float, wall: float, radius: float) -> Solid:
+def _rigid_body(draws: Draws, x: float, y: float, height: float, wall: float, radius: float) -> Solid:
     if radius == 0.0:
         return tray((-x, -y, 0), (x, y, height), wall)
-    bevel = rng.choice([0.0, 0.4 * radius])
+    bevel = 0.4 * radius if draws.pick("bottom_edge", ["sharp", "bevelled"]) == "bevelled" else 0.0
     profile = [(0.0, bevel), (bevel / height, 0.0), (1.0, 0.0)] if bevel > 0 else [(0.0, 0.0), (1.0, 0.0)]
     return rounded_tray((-x, -y, 0), (x, y, height), wall, radius, profile, floor=wall + bevel)
 
 
-def _bands(rng: Rng, x: float, y: float, low: float, high: float, band: float, wall: float, radius: float) -> Solid:
+def _bands(draws: Draws, x: float, y: float, low: float, high: float, band: float, wall: float, radius: float) -> Solid:
     """Boards and straps that stand out all around: at the edges, or across the front."""
     if band <= 0:
         return Solid()
@@ -92,37 +103,37 @@ def _bands(rng: Rng, x: float, y: float, low: float, high: float, band: float, w
     ends = [(low, low + 1.5 * wall), (high - 1.5 * wall, high)]
     solid = union(
         frame((-x - band, -y - band, z0), (x + band, y + band, z1), [0.8 * wall + band] * 4, 0, 1)
-        for z0, z1 in ends[: int(rng.integers(1, 3))]
+        for z0, z1 in ends[: draws.integer("bands", 1, 2)]
     )
-    if rng.random() < 0.6:
+    if draws.chance("strap", 0.6):
         half = 0.7 * wall
-        for share in ((-0.6, 0.6), (-0.7, 0.0, 0.7))[int(rng.integers(2))]:
+        for share in {2: (-0.6, 0.6), 3: (-0.7, 0.0, 0.7)}[draws.pick("straps", [2, 3])]:
             middle = share * (y - inner)
             for side in (-x - band, x - 0.8 * wall):
                 solid += box((side, side + band + 0.8 * wall), (middle - half, middle + half), (low, high))
     return solid
 
 
-def _interior(rng: Rng, x: float, y: float, height: float, wall: float, radius: float) -> Solid:
+def _interior(draws: Draws, x: float, y: float, height: float, wall: float) -> Solid:
     """Dividers below the rim."""
-    if rng.random() < 0.5:
+    if draws.chance("empty", 0.5):
         return Solid()
     thin = max(0.0015, 0.3 * wall)
-    top = height * rng.uniform(0.4, 0.9)
+    top = height * draws.number("divider_height", (0.4, 0.9))
     solid = Solid()
-    for edge in np.linspace(-y, y, int(rng.integers(2, 5)) + 1)[1:-1]:
+    for edge in np.linspace(-y, y, draws.integer("columns", 2, 4) + 1)[1:-1]:
         solid += box(x - wall / 2, (edge - thin, edge + thin), (wall / 2, top))
-    for edge in np.linspace(-x, x, int(rng.integers(1, 4)) + 1)[1:-1]:
+    for edge in np.linspace(-x, x, draws.integer("rows", 1, 3) + 1)[1:-1]:
         solid += box((edge - thin, edge + thin), y - wall / 2, (wall / 2, top))
     return solid
 
 
-def _feet(rng: Rng, x: float, y: float, wall: float) -> Solid:
+def _feet(draws: Draws, x: float, y: float, wall: float) -> Solid:
     """Plinth, blocks or balls below the corners, or nothing."""
-    kind = pick(rng, {"none": 0.5, "plinth": 0.2, "blocks": 0.2, "balls": 0.1})
-    drop = wall * rng.uniform(1.0, 3.0)
+    kind = draws.pick("feet", {"none": 0.5, "plinth": 0.2, "blocks": 0.2, "balls": 0.1})
+    drop = wall * draws.number("foot_height", (1.0, 3.0))
     if kind == "plinth":
-        out = 0.0 if rng.random() < 0.3 else 0.8 * wall
+        out = 0.0 if draws.chance("flush_plinth", 0.3) else 0.8 * wall
         return frame((-x - out, -y - out, -drop), (x, y + out, wall), [2 * wall + out] * 4, 0, 1)
     if kind == "blocks":
         corners = [(s * (x - 2 * wall), t * (y - 2 * wall)) for s in (-1, 1) for t in (-1, 1)]
@@ -133,35 +144,38 @@ def _feet(rng: Rng, x: float, y: float, wall: float) -> Solid:
 
 
 def _lid(
-    rng: Rng, x: float, y: float, seam: float, height: float, wall: float, radius: float, plain: bool
+    draws: Draws, x: float, y: float, seam: float, height: float, wall: float, radius: float, plain: bool
 ) -> tuple[Solid, float, bool]:
     """Lid above the seam, the top of its upright part, and whether a dome rises above that."""
-    kind = pick(rng, {"flat": 0.35, "hollow": 0.45, "dome": 0.2})
+    kind = draws.pick("lid", {"flat": 0.35, "hollow": 0.45, "dome": 0.2})
     if kind == "flat":
-        thick = wall * rng.uniform(0.7, 1.5)
-        over = rng.choice([0.0, rng.uniform(0.5, 1.2) * wall])
+        thick = wall * draws.number("lid_thickness", (0.7, 1.5))
+        over = draws.number("lid_overhang", (0.5, 1.2)) * wall
+        over *= draws.pick("lid_edge", ["flush", "overhanging"]) == "overhanging"
         low, high = (-x - over, -y - over, seam), (x, y + over, seam + thick)
         solid = box(low, high, fillet=radius, axis=2) if radius > 0 else box(low, high, fillet=0.2 * thick, steps=2)
         inner = 0.6 * over
-        if plain and radius == 0.0 and inner > GAP and over - inner > 0.0015 and rng.random() < 0.6:
-            skirt = min(rng.uniform(0.5, 3.0) * wall, 0.18 * height)  # on three sides, outside the body
+        if plain and radius == 0.0 and inner > GAP and over - inner > 0.0015 and draws.chance("skirt", 0.6):
+            skirt = min(
+                draws.number("skirt_height", (0.5, 3.0)) * wall, 0.18 * height
+            )  # on three sides, outside the body
             widths = [over - inner, 0.0, over - inner, over - inner]
             solid += frame((-x - over, -y - over, seam - skirt), (x, y + over, seam + 0.6 * thick), widths, 0, 1)
-        elif rng.random() < 0.4:  # a raised board on top
+        elif draws.chance("raised_board", 0.4):  # a raised board on top
             solid += box(0.75 * x, 0.85 * y, (seam + 0.5 * thick, seam + 1.4 * thick), fillet=0.3 * thick)
         return solid, seam + thick, False
     if kind == "hollow":
-        rise = height * with_tails(rng, (0.15, 0.9), (0.08, 1.6), 0.2)
+        rise = height * draws.number("lid_height", (0.15, 0.9), (0.08, 1.6), tails=0.2)
         if radius == 0.0:
             return tray((-x, -y, seam), (x, y, seam + rise), wall, min(wall, 0.7 * rise), side=-1), seam + rise, False
-        bevel = min(rng.choice([0.0, 0.6 * radius]), 0.5 * rise)
+        bevel = min(0.6 * radius, 0.5 * rise) if draws.pick("top_edge", ["sharp", "bevelled"]) == "bevelled" else 0.0
         profile = [(0.0, bevel), (0.3 * bevel / rise, 0.3 * bevel), (bevel / rise, 0.0), (1.0, 0.0)]
         shape = profile if bevel > 0 else [(0.0, 0.0), (1.0, 0.0)]
         floor = min(wall + bevel, 0.7 * rise)
         solid = rounded_tray((-x, -y, seam), (x, y, seam + rise), wall, radius, shape, side=-1, floor=floor)
         return solid, seam + rise, False
-    straight = height * rng.uniform(0.0, 0.25) + 2 * wall
-    rise = x * rng.uniform(0.35, 0.95)
+    straight = height * draws.number("lid_edge_height", (0.0, 0.25)) + 2 * wall
+    rise = x * draws.number("dome_height", (0.35, 0.95))
     angles = np.linspace(0.0, np.pi, 11)
     arc = [(cos(angles) * (x - w), seam + straight + sin(angles) * (rise - w)) for w in (0.0, wall)]
     rows = [np.stack([a, np.zeros(11), b], axis=1) for a, b in arc]
@@ -174,31 +188,12 @@ def _lid(
     return solid, seam + straight, True
 
 
-def _lid_handle(rng: Rng, x: float, y: float, top: float) -> Solid:
-    """Knob or bow on a flat top, or nothing."""
-    size = min(x, 0.5 * y, 0.12)
-    kind = rng.random()
-    if kind < 0.1:
-        return knob((0, 0, top), (0, 0, 1), 0.1 * size, 0.13 * size)
-    if kind < 0.25:
-        return bow_handle((0, -0.6 * size, top), (0, 0.6 * size, top), (0, 0, 1), 0.3 * size, 0.05 * size)
-    return Solid()
-
-
-def _side_handles(rng: Rng, x: float, y: float, height: float) -> Solid:
-    """Bows at the two ends of a chest."""
-    half, z = min(0.4 * x, 0.06), rng.uniform(0.55, 0.75) * height
-    return union(
-        bow_handle((-half, s * y, z), (half, s * y, z), (0, s, 0), 0.5 * half, 0.09 * half) for s in (-1.0, 1.0)
-    )
-
-
-def _latches(rng: Rng, chest: Assembly, front: float, y: float, seam: float, top: float) -> None:
+def _latches(draws: Draws, chest: Assembly, front: float, y: float, seam: float, top: float) -> None:
     """Hasps on the lid's front that hang down over the body and flip up."""
     width = min(0.08 * y, 0.02)
     upper = min(0.4 * (top - seam), 0.1 * y, 0.025)
     pin = 0.0025
-    for number, share in enumerate((0.0,) if rng.random() < 0.5 else (-0.6, 0.6)):
+    for number, share in enumerate({1: (0.0,), 2: (-0.6, 0.6)}[draws.pick("latches", {1: 0.5, 2: 0.5})]):
         middle = share * y
         axis_x = -front - 2.2 * pin
         z = seam + upper

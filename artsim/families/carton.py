@@ -8,7 +8,8 @@ flaps reach and turn, and hand holes vary.
 import numpy as np
 
 from artsim.families.proportions import unusual_sides
-from artsim.making.assembly import Assembly, JointSpec, Rng, pick, revolute
+from artsim.making.assembly import Assembly, JointSpec, revolute
+from artsim.making.draws import Draws
 from artsim.making.solids import Solid, box, frame, hull, tray
 from artsim.model.kinematics import Array
 
@@ -17,47 +18,46 @@ LEAST_SHARES, MOST_SHARES = (0.29, 0.43, 0.075), (0.765, 0.95, 0.79)
 """Depth, width and height of unusual boxes over their diagonal."""
 
 
-def carton(rng: Rng) -> Assembly:
+def carton(draws: Draws) -> Assembly:
     """Cardboard box; the longer flaps hang on the front and the back."""
-    width = rng.uniform(0.18, 0.6)
-    depth = width * rng.uniform(0.5, 1.0)
-    height = width * rng.uniform(0.3, 1.3)
-    if rng.random() < 0.3:
-        depth, width, height = unusual_sides(rng, LEAST_SHARES, MOST_SHARES, (0.14, 0.18, 0.06)).tolist()
-    wall = rng.uniform(0.003, 0.005)
+    width = draws.length("width", (0.18, 0.6))
+    depth = width * draws.number("depth", (0.5, 1.0))
+    height = width * draws.number("height", (0.3, 1.3))
+    if draws.chance("unusual", 0.3):
+        depth, width, height = unusual_sides(draws, LEAST_SHARES, MOST_SHARES, (0.14, 0.18, 0.06))
+    wall = draws.length("wall", (0.003, 0.005))
     x, y = depth / 2, width / 2
     result = Assembly(density=150.0)
-    result.add("body", _carton_body(rng, x, y, height, wall))
-    kind = pick(
-        rng, {"one": 0.12, "two": 0.25, "mitred": 0.14, "long": 0.16, "short": 0.11, "wheel": 0.1, "inner": 0.12}
-    )
-    flaps = _flaps(rng, kind, x, y, wall, height)
-    limit = np.deg2rad(_limit(rng, 100.0))
+    result.add("body", _carton_body(draws, x, y, height, wall))
+    kinds = {"one": 0.12, "two": 0.25, "mitred": 0.14, "long": 0.16, "short": 0.11, "wheel": 0.1, "inner": 0.12}
+    kind = draws.pick("flap_pattern", kinds)
+    flaps = _flaps(draws, kind, x, y, wall, height)
+    limit = np.deg2rad(_limit(draws, 100.0))
     for number, (side, inward, outline) in enumerate(flaps):
         z = height + GAP + (0.0007 if side in ("left", "right") else 0.0)
         if inward:
             result.add(f"flap_{number}", *_inner_flap(side, outline, x, y, height, wall))
             continue
-        own_limit = limit if rng.random() < 0.7 else np.deg2rad(_limit(rng, 95.0))
-        lip = rng.uniform(0.03, 0.08) if kind == "one" and rng.random() < 0.5 else 0.0
+        own_limit = limit if draws.chance("flaps_alike", 0.7) else np.deg2rad(_limit(draws, 95.0))
+        lip = draws.length("lip", (0.03, 0.08)) if kind == "one" and draws.chance("lipped", 0.5) else 0.0
         solid, joint = _outer_flap(side, outline, x, y, z, wall, own_limit, min(lip, 0.6 * height))
         result.add(f"flap_{number}", solid, joint)
     return result
 
 
-def _limit(rng: Rng, least: float) -> float:
+def _limit(draws: Draws, least: float) -> float:
     """Degrees that a flap turns by; some hang down flat against the outside."""
-    return 270.0 if rng.random() < 0.2 else float(rng.uniform(least, 250.0))
+    return 270.0 if draws.chance("hangs_down", 0.2) else draws.degrees("flap_angle", (least, 250.0))
 
 
-def _carton_body(rng: Rng, x: float, y: float, height: float, wall: float) -> Solid:
-    holes = rng.random() < 0.35 and min(x, y) > 0.1 and height > 0.15
+def _carton_body(draws: Draws, x: float, y: float, height: float, wall: float) -> Solid:
+    holes = draws.chance("hand_holes", 0.35) and min(x, y) > 0.1 and height > 0.15
     if not holes:
         return tray((-x, -y, 0), (x, y, height), wall)
     solid = box(x, y, (0, wall))
     solid += box((-x, -x + wall), y, (0, height)) + box((x - wall, x), y, (0, height))
-    low, high = height * rng.uniform(0.6, 0.68), height * rng.uniform(0.75, 0.82)
-    half = min(rng.uniform(0.035, 0.05), 0.6 * x)
+    low, high = height * draws.number("hole_bottom", (0.6, 0.68)), height * draws.number("hole_top", (0.75, 0.82))
+    half = min(draws.length("hole_width", (0.035, 0.05)), 0.6 * x)
     for end in (-y, y - wall):
         solid += frame((-x, end, 0), (x, end + wall, height), [x - half, x - half, low, height - high], 0, 2)
     return solid
@@ -67,49 +67,51 @@ Flap = tuple[str, bool, Array]
 """Where it hangs, whether it folds inward, and its outline (N, 2): distance from the hinge, and position along it."""
 
 
-def _flaps(rng: Rng, kind: str, x: float, y: float, wall: float, height: float) -> list[Flap]:
+def _flaps(draws: Draws, kind: str, x: float, y: float, wall: float, height: float) -> list[Flap]:
     c = 0.002  # between flaps
 
     def bar(reach: float, low: float, high: float, tip: float = 0.0) -> Array:
         return np.array([(0.0, low), (0.0, high), (reach, high - tip), (reach, low + tip)])
 
-    tip = rng.choice([0.0, rng.uniform(0.0, 0.03)])
+    tip = draws.length("flap_taper", (0.0, 0.03))
+    tip *= draws.pick("flap_ends", ["square", "tapered"]) == "tapered"
     if kind == "one":
         return [("back", False, bar(2 * x, -y, y, 0.0))]
     if kind == "two":
-        share = rng.choice([1.0, 1.0, rng.uniform(0.5, 1.5), rng.uniform(0.4, 0.9)])
-        second = 2.0 - share if share > 1.0 or rng.random() < 0.5 else share
-        if rng.random() < 0.7:
+        uneven, short = draws.number("first_reach", (0.5, 1.5)), draws.number("short_reach", (0.4, 0.9))
+        first = {"even": 1.0, "uneven": uneven, "short": short}
+        share = first[draws.pick("flaps_reach", ["even", "even", "uneven", "short"])]
+        second = 2.0 - share if share > 1.0 or draws.chance("flaps_meet", 0.5) else share
+        if draws.chance("wide_flaps", 0.7):
             return [("front", False, bar(share * x - c, -y, y, tip)), ("back", False, bar(second * x - c, -y, y, tip))]
         return [("left", False, bar(share * y - c, -x, x, tip)), ("right", False, bar(second * y - c, -x, x, tip))]
-    if kind == "mitred":  # at 45 degrees, whatever their reach; a raised flap's inner edge clears the next one's corner
-        corner = wall + c
-        long, short = min(x, y) * rng.uniform(0.6, 1.0), min(x, y) * rng.uniform(0.6, 0.95)
-        longs = bar(long - c, -y + corner, y - corner, long - c)
-        ends = bar(short - c, -x + corner, x - corner, short - 2 * c - wall)
-        return [(side, False, longs) for side in ("front", "back")] + [(s, False, ends) for s in ("left", "right")]
-    if kind == "long":  # short flaps reach a little way, long ones lie between them
-        short = y * rng.uniform(0.15, 0.6)
-        longs = bar(x * rng.choice([1.0, 0.8]) - c, -y + short + 2 * c, y - short - 2 * c, tip)
-        ends = bar(short, -x, x, min(tip, 0.2 * x))
-        return [(side, False, longs) for side in ("front", "back")] + [(s, False, ends) for s in ("left", "right")]
-    if kind == "short":
-        reach = x * rng.uniform(0.25, 0.6)
-        longs = bar(reach, -y, y, min(tip, 0.2 * y))
-        ends = bar(y * rng.choice([1.0, 0.7]) - c, -x + reach + 2 * c, x - reach - 2 * c, tip)
-        return [(side, False, longs) for side in ("front", "back")] + [(s, False, ends) for s in ("left", "right")]
     if kind == "wheel":  # each flap ends at the next one's side
-        p = y * rng.uniform(0.4, 0.9)
+        p = y * draws.number("flap_width", (0.4, 0.9))
         return [
             ("front", False, bar(x - c, -y, y - p - c)),
             ("left", False, bar(p - c, -x, -c)),
             ("back", False, bar(x - c, -y + p + c, y)),
             ("right", False, bar(p - c, c, x)),
         ]
-    short = min(y * rng.uniform(0.5, 0.95), height - 0.02)
-    longs = bar(x - c, -y, y, tip)
-    ends = bar(short, -x + wall + c, x - wall - c, 0.01)
-    return [(side, False, longs) for side in ("front", "back")] + [(side, True, ends) for side in ("left", "right")]
+    if kind == "mitred":  # at 45 degrees, whatever their reach; a raised flap's inner edge clears the next one's corner
+        corner, least = wall + c, min(x, y)
+        long, short = least * draws.number("long_reach", (0.6, 1.0)), least * draws.number("short_reach", (0.6, 0.95))
+        longs = bar(long - c, -y + corner, y - corner, long - c)
+        ends = bar(short - c, -x + corner, x - corner, short - 2 * c - wall)
+    elif kind == "long":  # short flaps reach a little way, long ones lie between them
+        short = y * draws.number("short_reach", (0.15, 0.6))
+        longs = bar(x * draws.pick("long_reach", [1.0, 0.8]) - c, -y + short + 2 * c, y - short - 2 * c, tip)
+        ends = bar(short, -x, x, min(tip, 0.2 * x))
+    elif kind == "short":
+        reach = x * draws.number("long_reach", (0.25, 0.6))
+        longs = bar(reach, -y, y, min(tip, 0.2 * y))
+        ends = bar(y * draws.pick("short_reach", [1.0, 0.7]) - c, -x + reach + 2 * c, x - reach - 2 * c, tip)
+    else:
+        longs = bar(x - c, -y, y, tip)
+        short = min(y * draws.number("short_reach", (0.5, 0.95)), height - 0.02)
+        ends = bar(short, -x + wall + c, x - wall - c, 0.01)
+    inward = kind == "inner"
+    return [(side, False, longs) for side in ("front", "back")] + [(side, inward, ends) for side in ("left", "right")]
 
 
 # Of each side: the axis across the hinge (0: X, 1: Y), its sign at that side, and the direction of the hinge.

@@ -11,7 +11,7 @@ from artsim.common.products import unit
 from artsim.making.assembly import JointSpec, revolute
 from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, Span, Vector, ends, rounded_rectangle
-from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, prism, rod, tube, union
+from artsim.making.solids import Solid, box, cylinder, deferred, frame, hull, hull_of, prism, rod, tube, union
 from artsim.model.kinematics import Array
 
 
@@ -20,6 +20,7 @@ def drawn_side(draws: Draws, name: str) -> float:
     return {"right": -1.0, "left": 1.0}[draws.pick(name, ["right", "left"])]
 
 
+@deferred
 def bar_handle(start: Vector, end: Vector, outward: Vector, reach: float, radius: float) -> Solid:
     """Straight bar between two points of a surface, ``reach`` before it along its unit normal, on two posts."""
     start, end, outward = (np.asarray(v, dtype=np.float64) for v in (start, end, outward))
@@ -30,6 +31,7 @@ def bar_handle(start: Vector, end: Vector, outward: Vector, reach: float, radius
     return bar.called("handle", outward)
 
 
+@deferred
 def bow_handle(start: Vector, end: Vector, outward: Vector, reach: float, radius: float) -> Solid:
     """Round bow from one point of the surface to another."""
     start, end, outward = (np.asarray(v, dtype=np.float64) for v in (start, end, outward))
@@ -39,6 +41,7 @@ def bow_handle(start: Vector, end: Vector, outward: Vector, reach: float, radius
     return tube(path, radius, 10).called("handle", outward)
 
 
+@deferred
 def knob(foot: Vector, outward: Vector, reach: float, radius: float) -> Solid:
     """Round knob on a thinner stem."""
     foot, outward = np.asarray(foot, dtype=np.float64), np.asarray(outward, dtype=np.float64)
@@ -47,6 +50,7 @@ def knob(foot: Vector, outward: Vector, reach: float, radius: float) -> Solid:
     return (stem + cylinder(neck, neck + 0.5 * radius * outward, radius, 0.8 * radius, 20)).called("knob", outward)
 
 
+@deferred
 def panel(kind: str, low: Vector, high: Vector, rail: float, recess: float) -> Solid:
     """Upright panel between two corners whose front faces -X: the face of a door or of a drawer.
 
@@ -93,6 +97,7 @@ def _rectangle(x: float, low: Array, high: Array) -> Array:
     return np.array([(x, y, z) for y in (low[0], high[0]) for z in (low[1], high[1])])
 
 
+@deferred
 def flat_handle(start: Vector, end: Vector, reach: float, thickness: float, depth: float) -> Solid:
     """Flat bar along Y or Z on two posts, on a panel that faces -X; its start is below or to the -Y side of its end.
 
@@ -115,6 +120,7 @@ def flat_handle(start: Vector, end: Vector, reach: float, thickness: float, dept
     return solid.called("handle", FRONT)
 
 
+@deferred
 def dial(foot: Vector, outward: Vector, reach: float, radius: float, sections: int = 24) -> Solid:
     """Control knob 1 mm clear of its panel; a grip across it shows how far it is turned."""
     foot, outward = np.asarray(foot, dtype=np.float64), np.asarray(outward, dtype=np.float64)
@@ -131,6 +137,7 @@ def dial(foot: Vector, outward: Vector, reach: float, radius: float, sections: i
     return (solid + hull(corners)).called("knob", outward)
 
 
+@deferred
 def holed_plate(low: Vector, high: Vector, center: Vector, radius: float, axis: int = 0, sections: int = 24) -> Solid:
     """Box with a round hole along a coordinate axis, about a center (2,) in the two other coordinates.
 
@@ -154,6 +161,7 @@ def holed_plate(low: Vector, high: Vector, center: Vector, radius: float, axis: 
     return solid
 
 
+@deferred
 def windowed_panel(low: Vector, high: Vector, margins: Sequence[float], pane: float, inset: float) -> Solid:
     """Panel that faces -X, with a window: a frame, and a pane ``inset`` behind its front and ``pane`` thick.
 
@@ -166,6 +174,7 @@ def windowed_panel(low: Vector, high: Vector, margins: Sequence[float], pane: fl
     return frame(low, high, margins) + glass.called("glass", FRONT)
 
 
+@deferred
 def wire_shelf(low: Vector, high: Vector, bars: int, wire: float) -> Solid:
     """Flat grid within a box: a square rim, as high as the box, and bars along X."""
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
@@ -175,6 +184,7 @@ def wire_shelf(low: Vector, high: Vector, bars: int, wire: float) -> Solid:
     return solid
 
 
+@deferred
 def rounded_tray(
     low: Vector, high: Vector, wall: float, radius: float, profile: ArrayLike = ((0.0, 0.0), (1.0, 0.0)),
     axis: int = 2, side: int = 1, floor: float | None = None, steps: int = 3,
@@ -218,6 +228,7 @@ def rounded_tray(
     return union(pieces)
 
 
+@deferred
 def push_button(face: Vector, size: Vector, round_off: float) -> Solid:
     """Button on a panel that faces -X, its front 8 mm before the panel, with 1.5 mm to travel and more to spare.
 
@@ -230,6 +241,7 @@ def push_button(face: Vector, size: Vector, round_off: float) -> Solid:
     )
 
 
+@deferred
 def cheeks(
     axle: tuple[float, float], radius: float, near: float, far: float, root_x: Span, root_z: Span, sections: int = 12
 ) -> Solid:
@@ -262,6 +274,7 @@ def front_handle(kind: str, start: Vector, end: Vector, reach: float, radius: fl
     return Solid()
 
 
+@deferred
 def rounded_shell(low: Vector, high: Vector, wall: float, radius: float, steps: int = 4) -> Solid:
     """Tunnel along X between two corners, open at both ends, its outer edges round."""
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
@@ -272,6 +285,7 @@ def rounded_shell(low: Vector, high: Vector, wall: float, radius: float, steps: 
     return union(prism(np.concatenate(pair), low[0], high[0], 0) for pair in pairs)
 
 
+@deferred
 def grid_panel(
     low: Vector, high: Vector, widths: Vector, columns: Vector, rows: Vector, bar: float, board: float,
     bore: tuple[float, float, float] | None = None,

@@ -10,8 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from artsim.families.details import front_handle, knob, panel
-from artsim.families.proportions import unusual_sides, with_tails
-from artsim.making.assembly import Assembly, Rng, pick, prismatic
+from artsim.families.proportions import unusual_sides
+from artsim.families.table_parts import PEDESTALS
+from artsim.making.assembly import Assembly, prismatic
+from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, Vector
 from artsim.making.solids import Solid, box, frame, hull_of, rod, tray, tube, union
 from artsim.model.kinematics import Array
@@ -27,16 +29,18 @@ _LEAST_SHARES, _MOST_SHARES = (0.148, 0.28, 0.11), (0.84, 0.983, 0.935)
 class _Style:
     """What all drawers of a piece of furniture share."""
 
-    def __init__(self, rng: Rng) -> None:
-        self.front = pick(rng, {"slab": 0.7, "shaker": 0.15, "raised": 0.1, "planks": 0.05})
-        self.overlay = rng.random() < 0.5  # the fronts lie before the case, or within it
-        self.handle = pick(rng, {"bar": 0.24, "knob": 0.24, "bow": 0.16, "two knobs": 0.08, "none": 0.28})
-        self.size = rng.uniform(0.15, 0.7)  # of the handle, over the front's width
-        self.reach = rng.uniform(0.015, 0.04)
-        self.rise = rng.uniform(-0.2, 0.3)  # of the handle above the front's middle, over its height
-        self.side = rng.uniform(0.6, 0.95)  # height of the drawer's sides over its front's
-        self.length = with_tails(rng, (0.75, 1.0), (0.45, 1.0), 0.15)  # of the drawer over the case's depth
-        self.travel = with_tails(rng, (0.65, 0.97), (0.35, 1.0), 0.3)  # over the drawer's length
+    def __init__(self, draws: Draws) -> None:
+        self.front = draws.pick("panel", {"slab": 0.7, "shaker": 0.15, "raised": 0.1, "planks": 0.05})
+        self.overlay = draws.chance("overlay", 0.5)  # the fronts lie before the case, or within it
+        self.handle = draws.pick("handle", {"bar": 0.24, "knob": 0.24, "bow": 0.16, "two knobs": 0.08, "none": 0.28})
+        self.size = draws.number("handle_length", (0.15, 0.7))  # of the handle, over the front's width
+        self.reach = draws.length("handle_reach", (0.015, 0.04))
+        self.rise = draws.number("handle_rise", (-0.2, 0.3))  # of the handle above the front's middle, over its height
+        self.side = draws.number("drawer_side", (0.6, 0.95))  # height of the drawer's sides over its front's
+        self.length = draws.number(
+            "drawer_length", (0.75, 1.0), (0.45, 1.0), tails=0.15
+        )  # of the drawer over the case's depth
+        self.travel = draws.number("travel", (0.65, 0.97), (0.35, 1.0), tails=0.3)  # over the drawer's length
 
 
 class _Furniture(Assembly):
@@ -99,80 +103,87 @@ class _Furniture(Assembly):
         return solid + _handle(style, front_low, front_high), style.travel * length
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """A body with drawers that slide out towards -X, closed at rest."""
-    furniture = _Furniture(_Style(rng))
-    pick(rng, {_chest: 0.45, _table: 0.3, _desk: 0.25})(rng, furniture)
+    furniture = _Furniture(_Style(draws))
+    kinds = {"chest": _chest, "table": _table, "desk": _desk}
+    kinds[draws.pick("kind", {"chest": 0.45, "table": 0.3, "desk": 0.25})](draws, furniture)
     return furniture
 
 
-def _chest(rng: Rng, furniture: _Furniture) -> None:
+def _chest(draws: Draws, furniture: _Furniture) -> None:
     """One case from side to side; some of its rows may be open, or have fronts that do not move."""
-    columns = pick(rng, {1: 0.68, 2: 0.23, 3: 0.09})
-    rows = int(rng.integers(1, max(2, 6 // columns) + 1))
-    width = columns * rng.uniform(0.28, 0.6) if columns > 1 else rng.uniform(0.3, 0.9)
-    depth, height = rng.uniform(0.3, 0.65), rows * rng.uniform(0.1, 0.28)
-    wall = rng.uniform(0.012, 0.03)
-    raised = rng.random() < 0.4
-    legs = rng.uniform(0.08, 0.45) if raised else rng.uniform(0.0, 0.1)
-    if rng.random() < 0.45:
-        depth, width, height = unusual_sides(rng, _LEAST_SHARES, _MOST_SHARES, (0.24, 0.3, 0.2)).tolist()
+    columns = draws.pick("columns", {1: 0.68, 2: 0.23, 3: 0.09})
+    rows = draws.integer("rows", 1, max(2, 6 // columns))
+    width = columns * draws.length("width", (0.28, 0.6) if columns > 1 else (0.3, 0.9))
+    depth, height = draws.length("depth", (0.3, 0.65)), rows * draws.length("height", (0.1, 0.28))
+    wall = draws.length("board", (0.012, 0.03))
+    raised = draws.chance("raised", 0.4)
+    legs = draws.length("stand_height", (0.08, 0.45) if raised else (0.0, 0.1))
+    if draws.chance("unusual", 0.45):
+        depth, width, height = unusual_sides(draws, _LEAST_SHARES, _MOST_SHARES, (0.24, 0.3, 0.2))
         legs = min(legs, 0.5 * height - 0.05)
         height -= legs
         columns, rows = max(1, min(columns, int(width / 0.2))), max(1, min(rows, int(height / 0.11)))
-        if width > 6 * height and rng.random() < 0.7:
-            columns = int(rng.integers(2, 5))
+        if width > 6 * height and draws.chance("wide_grid", 0.7):
+            columns = draws.integer("columns", 2, 4)
     x0, x1, y, top = -depth / 2, depth / 2, width / 2, legs + height
     contents = ["drawer"] * rows
-    if rows > 1 and rng.random() < 0.3:  # the lower rows, the commonest first
-        others = int(rng.integers(1, rows))
-        contents[:others] = [pick(rng, {"open": 0.7, "fixed": 0.3})] * others
+    if rows > 1 and draws.chance("mixed_rows", 0.3):  # the lower rows, the commonest first
+        others = draws.integer("other_rows", 1, rows - 1)
+        contents[:others] = [draws.pick("other_rows_are", {"open": 0.7, "fixed": 0.3})] * others
     furniture.add_case(
         (x0, -y, legs), (x1, y, top), wall,
-        [_widths(rng, -y + wall, y - wall, columns), _shares(rng, legs + wall, top - wall, rows)], contents,
+        [_widths(draws, -y + wall, y - wall, columns), _shares(draws, legs + wall, top - wall, rows)], contents,
     )  # fmt: skip
-    if rng.random() < 0.55:  # a top that stands over
-        over = rng.uniform(0.003, 0.04)
-        front = over + (_FRONT if furniture.style.overlay and rng.random() < 0.7 else 0.0)
-        thick = rng.uniform(0.01, 0.035)
+    if draws.chance("top", 0.55):  # a top that stands over
+        over = draws.length("top_overhang", (0.003, 0.04))
+        front = over + (_FRONT if furniture.style.overlay and draws.chance("top_over_fronts", 0.7) else 0.0)
+        thick = draws.length("top_thickness", (0.01, 0.035))
         furniture.body += box((x0 - front, x1), y + over, (top - 0.001, top + thick), fillet=0.3 * thick)
     if raised:
-        size = rng.uniform(0.02, 0.06)
-        furniture.body += _legs(rng, x0, x1, y, legs + 0.001, size)
+        size = draws.length("leg_width", (0.02, 0.06))
+        furniture.body += _legs(draws, x0, x1, y, legs + 0.001, size)
         furniture.record(legs=True)
     elif legs > 0.005:
-        recess = rng.uniform(0.0, 0.05)
+        recess = draws.length("plinth_setback", (0.0, 0.05))
         furniture.body += frame((x0 + recess, -y + 0.01, 0), (x1 - 0.01, y - 0.01, legs + 0.001), [wall] * 4, 0, 1)
 
 
-def _table(rng: Rng, furniture: _Furniture) -> None:
+def _table(draws: Draws, furniture: _Furniture) -> None:
     """A top on four legs with a row of drawers in the apron, at the front, the back or both."""
-    height = rng.uniform(0.35, 0.85)
-    width = height * rng.uniform(0.7, 3.2)
-    depth = min(max(width * rng.uniform(0.35, 1.0), 0.3), 1.0)
-    if rng.random() < 0.25:
-        depth, width, height = unusual_sides(rng, _LEAST_SHARES, _MOST_SHARES, (0.3, 0.34, 0.32)).tolist()
-    thick, over = rng.uniform(0.015, 0.05), rng.uniform(0.0, 0.07)
-    leg = height * rng.uniform(0.05, 0.13)
+    height = draws.length("height", (0.35, 0.85))
+    width = height * draws.number("width", (0.7, 3.2))
+    depth = min(max(width * draws.number("depth", (0.35, 1.0)), 0.3), 1.0)
+    if draws.chance("unusual", 0.25):
+        depth, width, height = unusual_sides(draws, _LEAST_SHARES, _MOST_SHARES, (0.3, 0.34, 0.32))
+    thick, over = draws.length("top_thickness", (0.015, 0.05)), draws.length("top_overhang", (0.0, 0.07))
+    leg = height * draws.number("leg_width", (0.05, 0.13))
     over = min(over, width / 2 - leg - _NARROWEST / 2, depth / 2 - leg - _SHALLOWEST / 2)  # room between the legs
     x0, x1, y = -depth / 2 + over, depth / 2 - over, width / 2 - over
     top = height - thick
-    apron = max(height * rng.uniform(0.11, 0.25), 0.075)
-    wall = rng.uniform(0.012, 0.02)
-    furniture.body += _top(rng, depth, width, top, height) + _legs(rng, x0, x1, y, top + 0.001, leg)
+    apron = max(height * draws.number("apron_height", (0.11, 0.25)), 0.075)
+    wall = draws.length("board", (0.012, 0.02))
+    furniture.body += _top(draws, depth, width, top, height) + _legs(draws, x0, x1, y, top + 0.001, leg)
     furniture.record(legs=True)
     between = y - leg + 0.002  # the apron reaches into the legs
-    inset = rng.uniform(0.0, 0.4) * leg
-    span = max(between * (1.0 if rng.random() < 0.6 else rng.uniform(0.4, 0.9)), _NARROWEST / 2)
-    middle = 0.0 if rng.random() < 0.8 else rng.choice([-1.0, 1.0]) * (between - span)
-    columns = int(np.clip(round(2 * span / rng.uniform(0.25, 0.7)), 1, 4))
-    sides = pick(rng, {"front": 0.82, "back": 0.08, "both": 0.1})
+    inset = draws.number("apron_inset", (0.0, 0.4)) * leg
+    span = max(
+        between * (1.0 if draws.chance("whole_apron", 0.6) else draws.number("case_width", (0.4, 0.9))), _NARROWEST / 2
+    )
+    middle = (
+        0.0
+        if draws.chance("centred", 0.8)
+        else {"right": -1.0, "left": 1.0}[draws.pick("aside", ["right", "left"])] * (between - span)
+    )
+    columns = int(np.clip(round(2 * span / draws.length("column_width", (0.25, 0.7))), 1, 4))
+    sides = draws.pick("open_sides", {"front": 0.82, "back": 0.08, "both": 0.1})
     deepest = depth - 2 * over - 2 * inset - wall
-    share = rng.uniform(0.3, 0.47) if sides == "both" else rng.uniform(0.45, 1.0)
+    share = draws.number("case_depth", (0.3, 0.47) if sides == "both" else (0.45, 1.0))
     if sides == "both" and deepest < 2.2 * _SHALLOWEST:
         sides = "front"
     reach = max(deepest * share, _SHALLOWEST)
-    edges = _widths(rng, middle - span + wall, middle + span - wall, columns)
+    edges = _widths(draws, middle - span + wall, middle + span - wall, columns)
     for back in (False, True):
         if sides in ("both", ("front", "back")[back]):
             furniture.add_case(
@@ -189,38 +200,45 @@ def _table(rng: Rng, furniture: _Furniture) -> None:
     for side in (-1, 1):
         beside = side * (y - inset), side * (y - inset - wall)
         furniture.body += box((x0 + leg - 0.002, x1 - leg + 0.002), beside, (top - apron, top + 0.001))
-    if rng.random() < 0.25:  # a shelf between the legs
-        z = rng.uniform(0.12, 0.35) * height
+    if draws.chance("shelf", 0.25):  # a shelf between the legs
+        z = draws.number("shelf_height", (0.12, 0.35)) * height
         furniture.body += box((x0 + 0.25 * leg, x1 - 0.25 * leg), y - 0.25 * leg, (z, z + 0.018))
 
 
-def _desk(rng: Rng, furniture: _Furniture) -> None:
+def _desk(draws: Draws, furniture: _Furniture) -> None:
     """A top over one or two pedestals with drawers; legs or a panel elsewhere, perhaps flat drawers between."""
-    height = rng.uniform(0.62, 0.82)
-    width, depth = height * rng.uniform(1.4, 2.4), height * rng.uniform(0.55, 1.0)
-    thick, over = rng.uniform(0.018, 0.05), rng.uniform(0.0, 0.05)
-    wall = rng.uniform(0.014, 0.022)
+    height = draws.length("height", (0.62, 0.82))
+    width, depth = height * draws.number("width", (1.4, 2.4)), height * draws.number("depth", (0.55, 1.0))
+    thick, over = draws.length("top_thickness", (0.018, 0.05)), draws.length("top_overhang", (0.0, 0.05))
+    wall = draws.length("board", (0.014, 0.022))
     x0, x1, y, top = -depth / 2 + over, depth / 2 - over, width / 2 - over, height - thick
-    furniture.body += _top(rng, depth, width, top, height)
-    pedestal = min(rng.uniform(0.28, 0.45), 0.4 * width)
-    sides = pick(rng, {(-1,): 0.35, (1,): 0.35, (-1, 1): 0.3})
-    on_legs = rng.random() < 0.4
-    leg = rng.uniform(0.035, 0.07)
-    low = height * rng.uniform(0.1, 0.6) if on_legs else (0.0 if rng.random() < 0.5 else rng.uniform(0.03, 0.1))
+    furniture.body += _top(draws, depth, width, top, height)
+    pedestal = min(draws.length("pedestal_width", (0.28, 0.45)), 0.4 * width)
+    sides = PEDESTALS[draws.pick("pedestals", {"right": 0.35, "left": 0.35, "both": 0.3})]
+    on_legs = draws.chance("on_legs", 0.4)
+    leg = draws.length("leg_width", (0.035, 0.07))
+    low = (
+        height * draws.number("pedestal_bottom", (0.1, 0.6))
+        if on_legs
+        else (0.0 if draws.chance("on_floor", 0.5) else draws.length("plinth_height", (0.03, 0.1)))
+    )
     outer = y - leg + 0.002 if on_legs else y
     if len(sides) == 2:
         pedestal = min(pedestal, outer - 0.1)  # room for knees
-    rows = int(rng.integers(1, 4 if len(sides) == 2 else 5))
+    rows = draws.integer("rows", 1, 3 if len(sides) == 2 else 4)
     rows = min(rows, max(1, int((top - low) / 0.1)))
     contents = ["drawer"] * rows
-    if rows > 1 and rng.random() < 0.3:
+    if rows > 1 and draws.chance("open_bottom", 0.3):
         contents[0] = "open"
     elif rows == 1 and top - low > 0.35:  # one drawer above an open compartment
         rows, contents = 2, ["open", "drawer"]
-    levels = _shares(rng, low + wall, top - wall, rows)
+    levels = _shares(draws, low + wall, top - wall, rows)
     if contents[0] == "open" and top - low > 0.3:  # the open compartment is higher than the drawers
         levels = np.concatenate(
-            [levels[:1], np.linspace(low + wall + rng.uniform(0.4, 0.7) * (top - low), top - wall, rows)]
+            [
+                levels[:1],
+                np.linspace(low + wall + draws.number("open_height", (0.4, 0.7)) * (top - low), top - wall, rows),
+            ]
         )
     for side in sides:
         near, far = sorted((side * outer, side * (outer - pedestal)))
@@ -233,37 +251,40 @@ def _desk(rng: Rng, furniture: _Furniture) -> None:
     right = outer - (pedestal if 1 in sides else wall) + 0.002
     if on_legs:
         furniture.record(legs=True)
-        furniture.body += _legs(rng, x0, x1, y, top + 0.001, leg)
+        furniture.body += _legs(draws, x0, x1, y, top + 0.001, leg)
     elif len(sides) == 1:  # a panel holds the other end
         edge = -sides[0] * y
         furniture.body += box((x0, x1), (edge, edge + sides[0] * wall), (0, top))
-    if on_legs or rng.random() < 0.7:  # a board at the back
+    if on_legs or draws.chance("back_panel", 0.7):  # a board at the back
         furniture.body += box(
-            (x1 - 0.06, x1 - 0.04), (left, right), (top - rng.uniform(0.15, 0.9) * (top - low), top + 0.001)
+            (x1 - 0.06, x1 - 0.04),
+            (left, right),
+            (top - draws.number("back_panel_height", (0.15, 0.9)) * (top - low), top + 0.001),
         )
-    if rng.random() < 0.5:
-        flat = rng.uniform(0.08, 0.13)
-        columns = pick(rng, {1: 0.7, 2: 0.3})
+    if draws.chance("flat_case", 0.5):
+        flat = draws.length("flat_case_height", (0.08, 0.13))
+        columns = draws.pick("columns", {1: 0.7, 2: 0.3})
         edges = np.linspace(left + wall, right - wall, columns + 1)
-        furniture.add_case(
-            (x0, left, top - flat), (x1 - max(0.058, rng.uniform(0.05, 0.3) * depth), right, top + 0.001), wall,
-            [edges, np.array([top - flat + wall, top - wall])],
-        )  # fmt: skip
+        far = x1 - max(0.058, draws.number("flat_case_setback", (0.05, 0.3)) * depth)
+        levels = np.array([top - flat + wall, top - wall])
+        furniture.add_case((x0, left, top - flat), (far, right, top + 0.001), wall, [edges, levels])
 
 
-def _shares(rng: Rng, low: float, high: float, rows: int) -> Array:
+def _shares(draws: Draws, low: float, high: float, rows: int) -> Array:
     """(rows + 1,) levels: equal, at random, or growing downwards."""
-    kind = rng.choice(3, p=[0.5, 0.3, 0.2])
-    heights = (np.ones(rows), rng.dirichlet([12.0] * rows), np.linspace(rng.uniform(1.2, 2.0), 1.0, rows))[kind]
-    return _levels(low, high, heights)
+    pattern = draws.pick("row_pattern", {"equal": 0.5, "random": 0.3, "growing": 0.2})
+    random = draws.rng.dirichlet([12.0] * rows)
+    growing = np.linspace(draws.number("row_growth", (1.2, 2.0)), 1.0, rows)
+    return _levels(low, high, {"equal": np.ones(rows), "random": random, "growing": growing}[pattern])
 
 
-def _widths(rng: Rng, low: float, high: float, columns: int) -> Array:
+def _widths(draws: Draws, low: float, high: float, columns: int) -> Array:
     """(columns + 1,) edges: of equal columns; the same from either end, as where knees go; or at random."""
-    kind = rng.choice(3, p=[0.6, 0.25, 0.15])
-    half = rng.uniform(0.7, 1.5, (columns + 1) // 2)
+    pattern = draws.pick("column_pattern", {"equal": 0.6, "mirrored": 0.25, "random": 0.15})
+    half = draws.numbers("column_share", 0.7, 1.5, (columns + 1) // 2)
     mirrored = np.concatenate([half, half[: columns // 2][::-1]])
-    return _levels(low, high, (np.ones(columns), mirrored, rng.dirichlet([12.0] * columns))[kind])
+    random = draws.rng.dirichlet([12.0] * columns)
+    return _levels(low, high, {"equal": np.ones(columns), "mirrored": mirrored, "random": random}[pattern])
 
 
 def _levels(low: float, high: float, shares: Array) -> Array:
@@ -273,18 +294,18 @@ def _levels(low: float, high: float, shares: Array) -> Array:
     return levels
 
 
-def _top(rng: Rng, depth: float, width: float, low: float, high: float) -> Solid:
-    radius = rng.choice([0.1, 0.45]) * (high - low)
+def _top(draws: Draws, depth: float, width: float, low: float, high: float) -> Solid:
+    radius = draws.pick("edge_rounding", [0.1, 0.45]) * (high - low)
     corners = (-depth / 2, -width / 2, low), (depth / 2, width / 2, high)
-    if rng.random() < 0.2:
-        return box(*corners, fillet=rng.uniform(0.02, 0.1), axis=2)
+    if draws.chance("round_corners", 0.2):
+        return box(*corners, fillet=draws.length("corner_radius", (0.02, 0.1)), axis=2)
     return box(*corners, fillet=radius)
 
 
-def _legs(rng: Rng, x0: float, x1: float, y: float, height: float, size: float) -> Solid:
+def _legs(draws: Draws, x0: float, x1: float, y: float, height: float, size: float) -> Solid:
     """Four legs with their outer edges on a rectangle: square or round, straight, tapered or turned."""
-    kind = pick(rng, {"square": 0.35, "tapered": 0.25, "round": 0.25, "turned": 0.15})
-    taper = rng.uniform(0.45, 0.9)
+    kind = draws.pick("leg_shape", {"square": 0.35, "tapered": 0.25, "round": 0.25, "turned": 0.15})
+    taper = draws.number("leg_taper", (0.45, 0.9))
     half, middle = size / 2, 0.5 * (x0 + x1)
     solid = Solid()
     for x in (x0 + half, x1 - half):

@@ -12,9 +12,10 @@ from typing import TypeVar
 import numpy as np
 
 from artsim.families.details import front_handle, knob, panel, swing_limits
-from artsim.making.assembly import JointSpec, Rng, prismatic, revolute
+from artsim.making.assembly import JointSpec, prismatic, revolute
+from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, about
-from artsim.making.solids import Solid, box, cylinder, hull_of, tray
+from artsim.making.solids import Solid, box, cylinder, deferred, hull_of, tray
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -73,7 +74,7 @@ class Style:
     level: bool  # handles of doors lie level rather than upright
 
 
-def drawer(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+def drawer(draws: Draws, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     """A drawer that slides out towards -X."""
     low, high = _front_box(cell, style)
     solid = _face(low, high, style)
@@ -81,41 +82,41 @@ def drawer(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     depth = style.back - high[0] - 0.01
     wall, clear = 0.009, 0.005
     bottom = cell.low[1] + clear
-    top = bottom + (cell.sides[1] - 2 * clear) * rng.uniform(0.55, 0.9)
+    top = bottom + (cell.sides[1] - 2 * clear) * draws.number("drawer_side", (0.55, 0.9))
     solid += tray((high[0] - 0.001, cell.low[0] + clear, bottom), (high[0] + depth, cell.high[0] - clear, top), wall)
     middle = 0.5 * (low + high)
-    rise = height * rng.choice([0.0, 0.0, 0.25])
+    rise = height * draws.pick("handle_rise", [0.0, 0.0, 0.25])
     half = 0.5 * min(style.handle_length, 0.75 * (high[1] - low[1]))
     solid += _handle(style, (low[0], middle[1], middle[2] + rise), 1, half, low, high)
     return Solid(), [("drawer", solid, prismatic("body", FRONT, 0.0, style.travel * depth, tuple(middle)))]
 
 
-def door(rng: Rng, cell: Cell, style: Style, hinge: str) -> tuple[Solid, list[Moving]]:
+def door(draws: Draws, cell: Cell, style: Style, hinge: str) -> tuple[Solid, list[Moving]]:
     """One door, hinged at its "left", "right" (as one stands before it), "top" or "bottom"."""
-    inside, trays = _interior(rng, cell, style)
-    leaf = _leaf(rng, cell, style, hinge, *_front_box(cell, style))
+    inside, trays = _interior(draws, cell, style)
+    leaf = _leaf(draws, cell, style, hinge, *_front_box(cell, style))
     return inside, [leaf, *trays]
 
 
-def double_door(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+def double_door(draws: Draws, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     """Two doors that meet in the middle."""
-    inside, trays = _interior(rng, cell, style)
+    inside, trays = _interior(draws, cell, style)
     low, high = _front_box(cell, style)
     middle = 0.5 * (low[1] + high[1])
-    seed = int(rng.integers(2**31))
+    seed = draws.seed("leaf")
     leaves = []
     for hinge, first, last in (("left", middle + GAP, high[1]), ("right", low[1], middle - GAP)):
         edges = np.array([low[0], first, low[2]]), np.array([high[0], last, high[2]])
-        leaves.append(_leaf(np.random.default_rng(seed), cell, style, hinge, *edges))
+        leaves.append(_leaf(draws.fork("", seed), cell, style, hinge, *edges))
     return inside, [*leaves, *trays]
 
 
-def sliding_doors(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+def sliding_doors(draws: Draws, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     """Two doors on two tracks, one behind the other."""
     thickness, clear = 0.016, 0.003
-    width = 0.5 * cell.sides[0] + rng.uniform(0.01, 0.03)
+    width = 0.5 * cell.sides[0] + draws.length("sliding_overlap", (0.01, 0.03))
     travel = cell.sides[0] - 2 * clear - width
-    left_first = 1 if rng.random() < 0.5 else -1
+    left_first = 1 if draws.chance("left_in_front", 0.5) else -1
     leaves: list[Moving] = []
     for track, side in enumerate((left_first, -left_first)):
         x = style.face + clear + track * (thickness + clear)
@@ -135,15 +136,15 @@ def sliding_doors(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Movin
         center = tuple(0.5 * (low + high))
         leaves.append(("sliding_door", solid, prismatic("body", (0, -side, 0), 0.0, travel, center)))
     depth = 2 * (thickness + clear) + clear
-    return _shelves(rng, cell, style.face + depth + 0.015, style), leaves
+    return _shelves(draws, cell, style.face + depth + 0.015, style), leaves
 
 
-def shelves(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+def shelves(draws: Draws, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     """An open cell."""
-    return _shelves(rng, cell, style.face + rng.uniform(0.0, 0.02), style), []
+    return _shelves(draws, cell, style.face + draws.length("shelf_setback", (0.0, 0.02)), style), []
 
 
-def fixed(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+def fixed(draws: Draws, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     """A front that does not move, as before a sink."""
     low, high = _front_box(cell, style)
     margin = np.array([0.0, 0.002, 0.002])
@@ -153,6 +154,7 @@ def fixed(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     return _face(low, high, style) + joint, []
 
 
+@deferred
 def boards_across(cell: Cell, style: Style, axis: int, edges: Array) -> Solid:
     """Boards that divide a cell along ``axis`` (0: Y, 1: Z), their middles at ``edges``."""
     solid = Solid()
@@ -164,17 +166,17 @@ def boards_across(cell: Cell, style: Style, axis: int, edges: Array) -> Solid:
     return solid
 
 
-def _interior(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
+def _interior(draws: Draws, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     """Behind a door: shelves, or trays that stay inside even when they are pulled out behind a closed door."""
     front = style.face + style.thickness + 0.02
     room = style.back - 0.008 - front
     width, height = cell.sides
-    if rng.random() > 0.22 or width < 0.25 or room < 0.25:
-        return _shelves(rng, cell, front, style), []
-    count = int(rng.integers(1, min(3, int(height // 0.16) + 1) + 1))
+    if not draws.chance("inner_trays", 0.22) or width < 0.25 or room < 0.25:
+        return _shelves(draws, cell, front, style), []
+    count = draws.integer("trays", 1, min(3, int(height // 0.16) + 1))
     pitch = height / count
-    share = rng.uniform(0.5, 0.65)
-    wall = rng.uniform(0.25, 0.7) * pitch
+    share = draws.number("tray_depth", (0.5, 0.65))
+    wall = draws.number("tray_height", (0.25, 0.7)) * pitch
     trays: list[Moving] = []
     for number in range(count):
         z = cell.low[1] + number * pitch + 0.006
@@ -184,15 +186,15 @@ def _interior(rng: Rng, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     return Solid(), trays
 
 
-def _shelves(rng: Rng, cell: Cell, front: float, style: Style) -> Solid:
+def _shelves(draws: Draws, cell: Cell, front: float, style: Style) -> Solid:
     width, height = cell.sides
-    count = int(rng.integers(0, int(height // 0.2) + 1)) if height > 0.2 else 0
+    count = draws.integer("shelves", 0, int(height // 0.2)) if height > 0.2 else 0
     solid = Solid()
     thick = min(style.board, 0.018)
     for z in np.linspace(cell.low[1], cell.high[1], count + 2)[1:-1]:
         across = (cell.low[0] - 0.001, cell.high[0] + 0.001)
         solid += box((front, style.back + 0.001), across, about(z, thick / 2))
-    if count == 0 and width > 0.8 and rng.random() < 0.5:
+    if count == 0 and width > 0.8 and draws.chance("partition", 0.5):
         y = 0.5 * (cell.low[0] + cell.high[0])
         upright = (cell.low[1] - 0.001, cell.high[1] + 0.001)
         solid += box((front, style.back + 0.001), about(y, thick / 2), upright)
@@ -220,7 +222,7 @@ def _face(low: Array, high: Array, style: Style) -> Solid:
     return panel(style.panel, low, high, style.rail, style.recess)
 
 
-def _leaf(rng: Rng, cell: Cell, style: Style, hinge: str, low: Array, high: Array) -> Moving:
+def _leaf(draws: Draws, cell: Cell, style: Style, hinge: str, low: Array, high: Array) -> Moving:
     """A hinged panel with its handle near the edge that opens."""
     across, end, axis = HINGES[hinge]
     along = 3 - across
@@ -242,12 +244,13 @@ def _leaf(rng: Rng, cell: Cell, style: Style, hinge: str, low: Array, high: Arra
     near = edge - bounds[1, across] if end > 0 else bounds[0, across] - edge
     limit, most = swing_limits(near, low[0] - bounds[0, 0])
     if outer:
-        limit = min(most, np.deg2rad(rng.choice([95.0, 110.0, 135.0, 170.0])))
+        limit = min(most, np.deg2rad(draws.pick("door_angle", [95.0, 110.0, 135.0, 170.0])))
     origin = 0.5 * (low + high)
     origin[across], origin[0] = edge, low[0] - 0.0005
     return "door", solid + handle, revolute("body", axis, tuple(origin), 0.0, float(limit))
 
 
+@deferred
 def _handle(
     style: Style, foot: tuple[float, float, float] | Array, along: int, half: float, low: Array, high: Array
 ) -> Solid:
@@ -270,10 +273,10 @@ def _handle(
         wide[along] = half
         wide[0] = 0.5 * reach
         middle = center - (0.5 * reach - 0.002, 0, 0)
-        return box(middle - wide, middle + wide, fillet=0.3 * radius, axis=along)
+        return box(middle - wide, middle + wide, fillet=0.3 * radius, axis=along).called("handle", FRONT)
     if style.handle == "cup":
         ends = [center + s * 0.8 * ahead for s in (-1, 1)]
         thick = np.array([0.0, 0.0, 0.004]) if along == 1 else np.array([0.0, 0.004, 0.0])
         lip = [box(e - (0.6 * reach, 0, 0) - thick - 0.001, e + (0.002, 0, 0) + thick + 0.001) for e in ends]
-        return hull_of(*lip)
+        return hull_of(*lip).called("handle", FRONT)
     return Solid()

@@ -11,7 +11,8 @@ import numpy as np
 
 from artsim.families import fronts
 from artsim.families.fronts import Cell, Moving, Style
-from artsim.making.assembly import Assembly, Rng, pick
+from artsim.making.assembly import Assembly
+from artsim.making.draws import Draws
 from artsim.making.outlines import about
 from artsim.making.solids import Solid, box, cylinder, frame, hull, union
 
@@ -28,85 +29,88 @@ KINDS: dict[str, tuple[tuple[tuple[float, float], ...], float, float]] = {
 MOST_MOVING = 9
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """A body with one to nine drawers, doors and trays, all closed at rest."""
-    kind = pick(rng, {kind: common for kind, (_, _, common) in KINDS.items()})
+    kind = draws.pick("kind", {kind: common for kind, (_, _, common) in KINDS.items()})
     ranges, drawers, _ = KINDS[kind]
-    width, depth, height, stand = (rng.uniform(*span) for span in ranges)
+    names = ("width", "depth", "height", "stand_height")
+    width, depth, height, stand = (draws.length(name, span) for name, span in zip(names, ranges, strict=True))
     stand = 0.0 if stand < 0.02 else stand
-    style = _style(rng, kind, depth)
+    style = _style(draws, kind, depth)
     edge = style.board
     whole = Cell((-width / 2 + edge, stand + edge), (width / 2 - edge, stand + height - edge))
 
     furniture = Assembly("body", density=650.0)
     furniture.record(handles=style.handle != "none")
-    cells, furniture.body = _divide(rng, whole, style, 0)
+    cells, furniture.body = _divide(draws, whole, style, 0)
     cells.sort(key=lambda item: -item[0].sides[0] * item[0].sides[1])
     for cell, recipe in cells:  # the largest, and those like it, are not left open
         must_move = recipe == cells[0][1]
-        inside, parts = _fill(np.random.default_rng(recipe), cell, style, drawers, must_move)
+        inside, parts = _fill(draws.fork("", recipe), cell, style, drawers, must_move)
         if len(furniture) + len(parts) > 1 + MOST_MOVING:
-            inside, parts = fronts.shelves(rng, cell, style)
+            inside, parts = fronts.shelves(draws, cell, style)
         furniture.body += inside
         for part in parts:
             furniture.add_numbered(*part)
-    furniture.body += _carcass(rng, kind, width, depth, height, stand, style, furniture)
+    furniture.body += _carcass(draws, kind, width, depth, height, stand, style, furniture)
     return furniture
 
 
-def _style(rng: Rng, kind: str, depth: float) -> Style:
-    framed = rng.random() < 0.25  # wide boards around the fronts
+def _style(draws: Draws, kind: str, depth: float) -> Style:
+    framed = draws.chance("wide_boards", 0.25)  # wide boards around the fronts
     place = {"base": 0.85, "wall": 0.15}.get(kind, 0.5)
     return Style(
         face=-depth / 2,
-        back=depth / 2 - rng.uniform(0.006, 0.015),
-        board=rng.uniform(0.03, 0.045) if framed else rng.uniform(0.015, 0.026),
-        lap=rng.uniform(0.006, 0.012) if framed else 1.0,
-        place=place if rng.random() < 0.6 else float(rng.choice([0.15, 0.5, 0.85])),
-        level=rng.random() < 0.2,
-        thickness=rng.uniform(0.016, 0.024),
-        overlay=rng.random() < 0.7,
-        panel=pick(rng, {"slab": 0.45, "shaker": 0.2, "raised": 0.22, "planks": 0.05, "glass": 0.08}),
-        rail=rng.uniform(0.035, 0.075),
-        recess=rng.uniform(0.005, 0.009),
-        handle=pick(rng, {"bar": 0.3, "bow": 0.2, "knob": 0.22, "block": 0.08, "cup": 0.08, "none": 0.12}),
-        handle_length=rng.uniform(0.08, 0.35) if rng.random() < 0.8 else rng.uniform(0.35, 0.8),
-        reach=rng.uniform(0.018, 0.04),
-        grip=rng.uniform(0.004, 0.008),
-        travel=rng.uniform(0.5, 0.88),
+        back=depth / 2 - draws.length("back_inset", (0.006, 0.015)),
+        board=draws.length("board", (0.03, 0.045) if framed else (0.015, 0.026)),
+        lap=draws.length("front_lap", (0.006, 0.012)) if framed else 1.0,
+        place=place if draws.chance("usual_place", 0.6) else draws.pick("handle_place", [0.15, 0.5, 0.85]),
+        level=draws.chance("handles_level", 0.2),
+        thickness=draws.length("front_thickness", (0.016, 0.024)),
+        overlay=draws.chance("overlay", 0.7),
+        panel=draws.pick("panel", {"slab": 0.45, "shaker": 0.2, "raised": 0.22, "planks": 0.05, "glass": 0.08}),
+        rail=draws.length("rail", (0.035, 0.075)),
+        recess=draws.length("recess", (0.005, 0.009)),
+        handle=draws.pick("handle", {"bar": 0.3, "bow": 0.2, "knob": 0.22, "block": 0.08, "cup": 0.08, "none": 0.12}),
+        handle_length=draws.length(
+            "handle_length", (0.08, 0.35) if draws.chance("short_handles", 0.8) else (0.35, 0.8)
+        ),
+        reach=draws.length("handle_reach", (0.018, 0.04)),
+        grip=draws.length("handle_radius", (0.004, 0.008)),
+        travel=draws.number("travel", (0.5, 0.88)),
     )
 
 
-def _divide(rng: Rng, cell: Cell, style: Style, level: int) -> tuple[list[tuple[Cell, int]], Solid]:
+def _divide(draws: Draws, cell: Cell, style: Style, level: int) -> tuple[list[tuple[Cell, int]], Solid]:
     """Cells, each with the seed of what it holds, and the boards between them. Equal cells often hold the same."""
     width, height = cell.sides
     large = max(width / 0.55, height / 0.75)
     fits = [min(4, int(width / 0.24)), min(5, int(height / 0.13))]
-    if max(fits) < 2 or rng.random() > (0.85, 0.5, 0.2)[level] * min(1.0, 0.35 + 0.5 * large):
-        return [(cell, int(rng.integers(2**31)))], Solid()
-    lengthwise = width / (width + 0.8 * height)
-    axis = int(rng.random() > lengthwise) if min(fits) > 1 else int(np.argmax(fits))
+    if max(fits) < 2 or not draws.chance("divided", (0.85, 0.5, 0.2)[level] * min(1.0, 0.35 + 0.5 * large)):
+        return [(cell, draws.seed("contents"))], Solid()
+    axis = int(np.argmax(fits))
+    if min(fits) > 1:
+        axis = 0 if draws.chance("side_by_side", width / (width + 0.8 * height)) else 1
     low, high = cell.low[axis], cell.high[axis]
-    alike = rng.random() < 0.6
+    alike = draws.chance("alike", 0.6)
     if alike:
-        count = int(rng.integers(2, fits[axis] + 1))
-        edges = np.linspace(low, high, count + 1)
+        edges = np.linspace(low, high, draws.integer(("columns", "rows")[axis], 2, fits[axis]) + 1)
     else:
-        edges = np.array([low, low + rng.uniform(0.25, 0.75) * (high - low), high])
+        edges = np.array([low, low + draws.number("divider", (0.25, 0.75)) * (high - low), high])
     half = style.board / 2
     cells: list[tuple[Cell, int]] = []
     boards = Solid()
-    seed = int(rng.integers(2**31))
+    seed = draws.seed("pattern")
     for first, last in pairwise(edges):
         near, far = (first + half if first > low else first), (last - half if last < high else last)
-        below = np.random.default_rng(seed) if alike else rng
-        parts, more = _divide(below, cell.between(axis, near, far), style, level + 1 if level < 2 else 2)
+        below = draws.fork("", seed) if alike else draws
+        parts, more = _divide(below, cell.between(axis, near, far), style, min(level + 1, 2))
         cells += parts
         boards += more
     return cells, boards + fronts.boards_across(cell, style, axis, edges[1:-1])
 
 
-def _fill(rng: Rng, cell: Cell, style: Style, drawers: float, must_move: bool) -> tuple[Solid, list[Moving]]:
+def _fill(draws: Draws, cell: Cell, style: Style, drawers: float, must_move: bool) -> tuple[Solid, list[Moving]]:
     """What stands in a cell: chosen by its shape."""
     width, height = cell.sides
     low_and_wide = 0.08 < height < 0.45 and width > 0.18 and height < 1.2 * width
@@ -121,72 +125,72 @@ def _fill(rng: Rng, cell: Cell, style: Style, drawers: float, must_move: bool) -
     }
     chances["drawer"] += sum(chances.values()) <= 0.0
     total = np.sum(list(chances.values()))
-    what = pick(rng, {name: chance / total for name, chance in chances.items()})
+    what = draws.pick("holds", {name: chance / total for name, chance in chances.items()})
     plain = {"drawer": fronts.drawer, "double": fronts.double_door, "sliding": fronts.sliding_doors,
              "open": fronts.shelves, "fixed": fronts.fixed}  # fmt: skip
     if what in plain:
-        return plain[what](rng, cell, style)
+        return plain[what](draws, cell, style)
     if what == "flap":
-        return fronts.door(rng, cell, style, "top" if rng.random() < 0.7 else "bottom")
+        return fronts.door(draws, cell, style, draws.pick("hinge", {"top": 0.7, "bottom": 0.3}))
     outside = [name for name, outer in (("left", cell.outer_high[0]), ("right", cell.outer_low[0])) if outer]
-    return fronts.door(rng, cell, style, pick(rng, outside if outside else ["left", "right"]))
+    return fronts.door(draws, cell, style, draws.pick("hinge", outside if outside else ["left", "right"]))
 
 
 def _carcass(
-    rng: Rng, kind: str, width: float, depth: float, height: float, stand: float, style: Style, furniture: Assembly
+    draws: Draws, kind: str, width: float, depth: float, height: float, stand: float, style: Style, furniture: Assembly
 ) -> Solid:
     """Outer boards, top and what it stands on."""
     x0, x1, y, board = style.face, depth / 2, width / 2, style.board
     top = stand + height
-    to_floor = stand > 0 and rng.random() < 0.3
+    to_floor = stand > 0 and draws.chance("sides_to_floor", 0.3)
     sides_from = 0.0 if to_floor else stand
     solid = box((style.back, x1), y - 0.001, (stand + 0.001, top - 0.001))
     solid += union(box((x0, x1), about(s, board / 2), (sides_from, top)) for s in (board / 2 - y, y - board / 2))
     solid += box((x0, x1), y - 0.001, (stand, stand + board))
-    if kind == "base" and rng.random() < 0.4:  # open at the top, with rails for a worktop
-        rail = rng.uniform(0.06, 0.12)
+    if kind == "base" and draws.chance("worktop_rails", 0.4):  # open at the top, with rails for a worktop
+        rail = draws.length("worktop_rail_depth", (0.06, 0.12))
         for near, far in ((x0, x0 + rail), (style.back - rail, x1 - 0.001)):
             solid += box((near, far), y - 0.001, (top - board, top))
     else:
         solid += box((x0, x1), y - 0.001, (top - board, top))
-        solid += _top(rng, kind, x0, x1, y, top)
-    if kind not in ("base", "wall") and rng.random() < 0.15:  # posts at the corners, down to the floor
-        post = rng.uniform(0.02, 0.045)
+        solid += _top(draws, kind, x0, x1, y, top)
+    if kind not in ("base", "wall") and draws.chance("corner_posts", 0.15):  # down to the floor
+        post = draws.length("post_width", (0.02, 0.045))
         to_floor = False
         solid += union(box((near, min(s * y, s * (y + post)), 0), (near + post, max(s * y, s * (y + post)), top))
                        for near in (x0 - fronts.GAP, x1 - post) for s in (-1, 1))  # fmt: skip
     if to_floor:
-        setback = x0 + rng.uniform(0.02, 0.07)
+        setback = x0 + draws.length("plinth_setback", (0.02, 0.07))
         return solid + box((setback, setback + board), y - 0.001, (0, stand + 0.001))
-    return solid + (_stand(rng, kind, x0, x1, y, stand, board, furniture) if stand > 0 else Solid())
+    return solid + (_stand(draws, kind, x0, x1, y, stand, board, furniture) if stand > 0 else Solid())
 
 
-def _top(rng: Rng, kind: str, x0: float, x1: float, y: float, top: float) -> Solid:
-    if kind == "wall" or rng.random() < 0.25:
+def _top(draws: Draws, kind: str, x0: float, x1: float, y: float, top: float) -> Solid:
+    if kind == "wall" or draws.chance("no_top", 0.25):
         return Solid()
-    over = rng.uniform(0.0, 0.035)
-    thick = rng.uniform(0.012, 0.04)
+    over = draws.length("top_overhang", (0.0, 0.035))
+    thick = draws.length("top_thickness", (0.012, 0.04))
     front = x0 - 0.022 - over
     solid = box((front, x1), y + over, (top - 0.001, top + thick))
-    if kind == "tall" and rng.random() < 0.4:  # cornice
+    if kind == "tall" and draws.chance("cornice", 0.4):
         for step in (1, 2):
             more, z = over + 0.012 * step, top + thick * step
             solid += box((x0 - 0.022 - more, x1), y + more, (z - 0.001, z + thick))
-    if kind in ("dresser", "sideboard", "nightstand") and rng.random() < 0.12:  # board at the back
-        solid += box((x1 - 0.02, x1), y, (top, top + thick + rng.uniform(0.05, 0.2)))
+    if kind in ("dresser", "sideboard", "nightstand") and draws.chance("backboard", 0.12):
+        solid += box((x1 - 0.02, x1), y, (top, top + thick + draws.length("backboard_height", (0.05, 0.2))))
     return solid
 
 
 def _stand(
-    rng: Rng, kind: str, x0: float, x1: float, y: float, height: float, board: float, furniture: Assembly
+    draws: Draws, kind: str, x0: float, x1: float, y: float, height: float, board: float, furniture: Assembly
 ) -> Solid:
     """Plinth or legs below the body."""
-    if kind == "base" or (height < 0.1 and rng.random() < 0.6):
-        setback = rng.uniform(0.03, 0.08) if kind == "base" else rng.uniform(-0.015, 0.03)
+    if kind == "base" or (height < 0.1 and draws.chance("plinth", 0.6)):
+        setback = draws.length("plinth_setback", (0.03, 0.08) if kind == "base" else (-0.015, 0.03))
         wide = y - 0.5 * abs(setback) + 0.01
         return frame((x0 + setback, -wide, 0), (x1, wide, height + 0.001), [board] * 4, 0, 1)
-    if height < 0.2 and rng.random() < 0.25:  # brackets: an angle at each corner
-        arm, thick = rng.uniform(0.06, 0.12), rng.uniform(0.018, 0.03)
+    if height < 0.2 and draws.chance("brackets", 0.25):  # brackets: an angle at each corner
+        arm, thick = draws.length("bracket_length", (0.06, 0.12)), draws.length("bracket_thickness", (0.018, 0.03))
         ends = [(a, b, sx, sy) for sx, a in ((1, x0), (-1, x1)) for sy, b in ((1, -y), (-1, y))]
         return union(
             hull([(a + sx * u * p, b + sy * v * p, z) for p, z in ((1.0, height + 0.001), (0.6, 0.0))
@@ -194,18 +198,19 @@ def _stand(
             for a, b, sx, sy in ends for du, dv in ((arm, thick), (thick, arm))
         )  # fmt: skip
     furniture.record(legs=True)
-    radius = rng.uniform(0.012, 0.03)
-    taper = rng.uniform(0.45, 1.0)
-    splay = rng.choice([0.0, rng.uniform(0.0, 0.25)]) * height
-    inset = radius + rng.uniform(0.0, 0.06)
-    sections, legs = int(rng.choice([4, 16])), Solid()
+    radius = draws.length("leg_radius", (0.012, 0.03))
+    taper = draws.number("leg_taper", (0.45, 1.0))
+    splay = draws.number("leg_splay", (0.0, 0.25)) * height
+    splay *= draws.pick("legs_stand", ["upright", "splayed"]) == "splayed"
+    inset = radius + draws.length("leg_inset", (0.0, 0.06))
+    sections, legs = draws.pick("leg_sides", [4, 16]), Solid()
     for sx, x in ((-1, x0 + inset), (1, x1 - inset)):
         for sy in (-1, 1):
             head = np.array([x, sy * (y - inset), height + 0.002])
             foot = head + (0.8 * sx * splay, 0.8 * sy * splay, -height - 0.002)
             legs += cylinder(foot, head, taper * radius, radius, sections)
-    if height > 0.12 and rng.random() < 0.5:  # apron
-        drop = rng.uniform(0.02, 0.05)
+    if height > 0.12 and draws.chance("apron", 0.5):
+        drop = draws.length("apron_height", (0.02, 0.05))
         legs += frame((x0 + inset - 0.008, -y + inset - 0.008, height - drop),
                       (x1 - inset + 0.008, y - inset + 0.008, height + 0.001), [0.016] * 4, 0, 1)  # fmt: skip
     return legs

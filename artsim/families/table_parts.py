@@ -6,15 +6,18 @@ import numpy as np
 
 from artsim.families import fronts
 from artsim.families.fronts import Cell, Moving, Style
-from artsim.making.assembly import Assembly, Rng, continuous, pick, prismatic, revolute
+from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.draws import Draws
 from artsim.making.outlines import Vector, about
 from artsim.making.solids import Solid, box, cylinder, hull_of, rod, tube, union
 
 GAP = 0.003
+PEDESTALS = {"right": (-1,), "left": (1,), "both": (-1, 1)}
+"""Sides of a desk, along Y, that have a pedestal."""
 
 
 def add_case(
-    rng: Rng, table: Assembly, low: Vector, high: Vector, style: Style, grid: tuple[int, int], doors: float,
+    draws: Draws, table: Assembly, low: Vector, high: Vector, style: Style, grid: tuple[int, int], doors: float,
     back: bool = False, free: tuple[bool, bool] = (False, False),
 ) -> None:  # fmt: skip
     """A case between two corners, open towards -X, with a grid of cells, so many columns and rows.
@@ -28,13 +31,13 @@ def add_case(
     solid += union(box((style.face, high[0]), (low[1], high[1]), (z, z + board)) for z in (low[2], high[2] - board))
     solid += union(box((style.face, high[0]), (y, y + board), (low[2], high[2])) for y in (low[1], high[1] - board))
     whole = Cell((low[1] + board, low[2] + board), (high[1] - board, high[2] - board), (free[0], True), (free[1], True))
-    columns, boards = _divided(rng, whole, 0, grid[0], style)
+    columns, boards = _divided(draws, whole, 0, grid[0], style)
     solid += boards
-    recipe, alike = int(rng.integers(2**31)), rng.random() < 0.6
+    recipe, alike = draws.seed("pattern"), draws.chance("columns_alike", 0.6)
     parts: list[Moving] = []
     for column in columns:
-        draw = np.random.default_rng(recipe) if alike else rng
-        rows = grid[1] if alike else int(rng.integers(1, grid[1] + 1))
+        draw = draws.fork("", recipe) if alike else draws
+        rows = grid[1] if alike else draws.integer("rows", 1, grid[1])
         cells, boards = _divided(draw, column, 1, rows, style)
         solid += boards
         for cell in cells:
@@ -46,11 +49,11 @@ def add_case(
         table.add_numbered(*(_mirrored(part) if back else part))
 
 
-def _divided(rng: Rng, cell: Cell, axis: int, count: int, style: Style) -> tuple[list[Cell], Solid]:
+def _divided(draws: Draws, cell: Cell, axis: int, count: int, style: Style) -> tuple[list[Cell], Solid]:
     """Cells side by side (axis 0) or one above the other (axis 1), and the boards between them."""
     room = cell.sides[axis]
     count = max(1, min(count, int(room / (0.16 if axis == 0 else 0.085))))
-    shares = np.ones(count) if rng.random() < 0.5 else rng.uniform(0.7, 1.5, count)
+    shares = np.ones(count) if draws.chance("equal_cells", 0.5) else draws.numbers("cell_share", 0.7, 1.5, count)
     shares = np.maximum(shares / shares.sum(), 0.75 / count)  # the least still holds a drawer
     edges = cell.low[axis] + np.concatenate([[0.0], np.cumsum(shares) / shares.sum()]) * room
     half = style.board / 2
@@ -62,22 +65,21 @@ def _divided(rng: Rng, cell: Cell, axis: int, count: int, style: Style) -> tuple
     return cells, fronts.boards_across(cell, style, axis, edges[1:-1])
 
 
-def _fill(rng: Rng, cell: Cell, style: Style, doors: float, must_move: bool) -> tuple[Solid, list[Moving]]:
+def _fill(draws: Draws, cell: Cell, style: Style, doors: float, must_move: bool) -> tuple[Solid, list[Moving]]:
     """What a cell holds."""
     width, height = cell.sides
-    if not must_move and rng.random() < 0.12:
-        return fronts.shelves(rng, cell, style) if rng.random() < 0.7 else fronts.fixed(rng, cell, style)
-    if height > 0.2 and width > 0.05 and rng.random() < doors * (1.0 if height > 0.3 else 0.6):
-        if width > 0.42 and rng.random() < 0.75:
-            return (
-                fronts.double_door(rng, cell, style) if rng.random() < 0.85 else fronts.sliding_doors(rng, cell, style)
-            )
-        if width < 1.3 * height:
-            return fronts.door(rng, cell, style, pick(rng, ["left", "right"]))
-        return fronts.door(rng, cell, style, pick(rng, ["bottom", "top"]))
+    if not must_move and draws.chance("still", 0.12):
+        still = {"open": fronts.shelves, "fixed": fronts.fixed}
+        return still[draws.pick("still_front", {"open": 0.7, "fixed": 0.3})](draws, cell, style)
+    if height > 0.2 and width > 0.05 and draws.chance("has_door", doors * (1.0 if height > 0.3 else 0.6)):
+        if width > 0.42 and draws.chance("door_pair", 0.75):
+            pairs = {"hinged": fronts.double_door, "sliding": fronts.sliding_doors}
+            return pairs[draws.pick("pair", {"hinged": 0.85, "sliding": 0.15})](draws, cell, style)
+        hinges = ["left", "right"] if width < 1.3 * height else ["bottom", "top"]
+        return fronts.door(draws, cell, style, draws.pick("hinge", hinges))
     if height > 0.65:
-        return fronts.door(rng, cell, style, pick(rng, ["left", "right"]))
-    return fronts.drawer(rng, cell, style)
+        return fronts.door(draws, cell, style, draws.pick("hinge", ["left", "right"]))
+    return fronts.drawer(draws, cell, style)
 
 
 def _mirrored(part: Moving) -> Moving:
@@ -89,18 +91,18 @@ def _mirrored(part: Moving) -> Moving:
     return label, solid.mirrored(0), replace(joint, axis=axis, origin=tuple(origin.tolist()))
 
 
-def table_top(rng: Rng, depth: float, width: float, low: float, high: float) -> Solid:
+def table_top(draws: Draws, depth: float, width: float, low: float, high: float) -> Solid:
     """A board with round corners or round edges, from height ``low`` to ``high``."""
     corners = (-depth / 2, -width / 2, low), (depth / 2, width / 2, high)
-    if rng.random() < 0.25:
-        return box(*corners, fillet=rng.uniform(0.02, 0.12), axis=2)
-    return box(*corners, fillet=rng.choice([0.1, 0.3, 0.49]) * (high - low))
+    if draws.chance("round_corners", 0.25):
+        return box(*corners, fillet=draws.length("corner_radius", (0.02, 0.12)), axis=2)
+    return box(*corners, fillet=draws.pick("edge_rounding", [0.1, 0.3, 0.49]) * (high - low))
 
 
-def four_legs(rng: Rng, x: float, y: float, low: float, high: float, size: float, splay: bool) -> Solid:
+def four_legs(draws: Draws, x: float, y: float, low: float, high: float, size: float, splay: bool) -> Solid:
     """Four legs within a rectangle: square, tapered, round, turned or a loop at either end."""
-    kind = pick(rng, {"square": 0.3, "tapered": 0.22, "round": 0.22, "turned": 0.13, "loops": 0.13})
-    half, taper = size / 2, rng.uniform(0.4, 0.9)
+    kind = draws.pick("leg_shape", {"square": 0.3, "tapered": 0.22, "round": 0.22, "turned": 0.13, "loops": 0.13})
+    half, taper = size / 2, draws.number("leg_taper", (0.4, 0.9))
     tall = high - low
     out = min(0.12 * tall, 0.2 * min(x, y)) if splay and kind in ("tapered", "round") else 0.0
     solid = Solid()
@@ -132,28 +134,32 @@ def four_legs(rng: Rng, x: float, y: float, low: float, high: float, size: float
     return solid
 
 
-def drop_leaves(rng: Rng, table: Assembly, depth: float, width: float, top: float, height: float) -> None:
+def drop_leaves(draws: Draws, table: Assembly, depth: float, width: float, top: float, height: float) -> None:
     """Leaves at one or both ends that hang down when they turn."""
-    long = rng.uniform(0.15, 0.4) * width
+    long = draws.number("leaf_length", (0.15, 0.4)) * width
     long = min(long, top - 0.05)
-    for side in (-1, 1)[: int(rng.integers(1, 3))]:
+    for side in (-1, 1)[: draws.integer("leaves", 1, 2)]:
         near, far = side * (width / 2 + GAP), side * (width / 2 + GAP + long)
         leaf = box(depth / 2, (min(near, far), max(near, far)), (top, height), fillet=0.2 * (height - top))
-        joint = revolute("body", (-side, 0, 0), (0.0, near, top), 0.0, np.pi / 2 * rng.uniform(0.9, 1.0))
+        joint = revolute(
+            "body", (-side, 0, 0), (0.0, near, top), 0.0, np.pi / 2 * draws.number("leaf_angle", (0.9, 1.0))
+        )
         table.add_numbered("leaf", leaf, joint)
 
 
-def keyboard_tray(rng: Rng, table: Assembly, front: float, near: float, far: float, top: float, deep: float) -> None:
+def keyboard_tray(
+    draws: Draws, table: Assembly, front: float, near: float, far: float, top: float, deep: float
+) -> None:
     """A board that slides out below the top between two rails."""
     room = far - near
-    wide = room * rng.uniform(0.6, 0.96)
+    wide = room * draws.number("tray_width", (0.6, 0.96))
     middle = 0.5 * (near + far)
     y0, y1 = middle - 0.5 * wide, middle + 0.5 * wide
-    z = top - rng.uniform(0.07, 0.12)
+    z = top - draws.length("tray_drop", (0.07, 0.12))
     for y in (y0 - 0.012, y1):
         table.body += box((front + 0.01, front + deep), (y, y + 0.012), (z - 0.005, top + 0.001))
     board = box((front + 0.005, front + deep), (y0 + GAP, y1 - GAP), (z, z + 0.018), fillet=0.004)
-    joint = prismatic("body", (-1, 0, 0), 0.0, deep * rng.uniform(0.5, 0.85), (front, middle, z))
+    joint = prismatic("body", (-1, 0, 0), 0.0, deep * draws.number("travel", (0.5, 0.85)), (front, middle, z))
     table.add_numbered("drawer", board, joint)
 
 
