@@ -55,6 +55,12 @@ def unit(vectors: ArrayLike) -> Array:
     return vectors / (lengths if vectors.ndim == 1 else lengths[..., None])
 
 
+def cross(a: ArrayLike, b: ArrayLike) -> Array:
+    """Cross product of two (3,) vectors: that of NumPy takes ten times as long for single ones."""
+    (ax, ay, az), (bx, by, bz) = _numbers(a), _numbers(b)
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+
+
 def matmul(a: ArrayLike, b: ArrayLike) -> Array:
     """Matrix products, as ``a @ b`` of arrays of at least two axes.
 

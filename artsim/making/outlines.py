@@ -1,12 +1,13 @@
 """What solids are drawn from: directions, spans, angles, and outlines, which are arrays of points."""
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.common.elementary import power as raised
-from artsim.common.products import unit
+from artsim.common.products import cross, unit
 from artsim.model.kinematics import Array
 
 Vector = Sequence[float] | Array
@@ -41,15 +42,22 @@ def arch(half: float, rise: float, count: int, first: float = 0.0, last: float =
 def frame_about(normal: Vector) -> tuple[Array, Array]:
     """Two unit vectors that complete a normal to a right-handed frame."""
     w = unit(normal)
-    u = unit(np.cross(np.eye(3)[np.argmin(np.abs(w))], w))
-    return u, np.cross(w, u)
+    u = unit(cross(np.eye(3)[np.argmin(np.abs(w))], w))
+    return u, cross(w, u)
 
 
 def circle(center: Vector, normal: Vector, radius: float, sections: int = 24) -> Array:
     """(sections, 3) points of a circle."""
     u, v = frame_about(normal)
+    c, s = around(sections)
+    return np.asarray(center) + radius * (c * u + s * v)
+
+
+@cache
+def around(sections: int) -> tuple[Array, Array]:
+    """(sections, 1) cosines and (sections, 1) sines of equal steps of a full turn, from 0."""
     angles = np.arange(sections) * (2.0 * np.pi / sections)
-    return np.asarray(center) + radius * (cos(angles)[:, None] * u + sin(angles)[:, None] * v)
+    return cos(angles)[:, None], sin(angles)[:, None]
 
 
 def rounded_rectangle(low: Vector, high: Vector, radius: float, steps: int = 4) -> Array:

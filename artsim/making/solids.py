@@ -18,8 +18,8 @@ from manifold3d import Manifold, OpType
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.common.elementary import cos, sin
-from artsim.common.products import apply, dot, unit
-from artsim.making.outlines import Span, Vector, circle, ends, frame_about, rounded_rectangle
+from artsim.common.products import apply, cross, dot, unit
+from artsim.making.outlines import Span, Vector, around, circle, ends, frame_about, rounded_rectangle
 from artsim.model.kinematics import Array
 from artsim.model.transforms import rotation_about
 
@@ -320,13 +320,13 @@ def _rings(path: Array, radius: float | Sequence[float], sections: int, closed: 
     before = np.roll(steps, 1, axis=0) if closed else np.concatenate([steps[:1], steps])
     after = steps if closed else np.concatenate([steps, steps[-1:]])
     u, _ = frame_about(after[0])
-    angles = np.arange(sections) * (2.0 * np.pi / sections)
+    c, s = around(sections)
     rings = []
     for point, r, a, b in zip(path, radii, before, after, strict=True):
         tangent = unit(a + b)
         u = unit(u - dot(u, tangent) * tangent)
-        v = np.cross(tangent, u)
-        rings.append(point + r * (cos(angles)[:, None] * u + sin(angles)[:, None] * v))
+        v = cross(tangent, u)
+        rings.append(point + r * (c * u + s * v))
     return rings
 
 
