@@ -11,10 +11,10 @@ import numpy as np
 
 from artsim.families.details import front_handle, knob, panel
 from artsim.families.proportions import unusual_sides
-from artsim.families.table_parts import PEDESTALS
+from artsim.families.table_parts import PEDESTALS, levels
 from artsim.making.assembly import Assembly, prismatic
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, Vector
+from artsim.making.outlines import FRONT, Vector, about
 from artsim.making.solids import Solid, box, frame, hull_of, rod, tray, tube, union
 from artsim.model.kinematics import Array
 
@@ -26,10 +26,11 @@ _LEAST_SHARES, _MOST_SHARES = (0.148, 0.28, 0.11), (0.84, 0.983, 0.935)
 """Depth, width and height of unusual furniture over its diagonal."""
 
 
-class _Style:
-    """What all drawers of a piece of furniture share."""
+class _Furniture(Assembly):
+    """Furniture whose drawers are all of one style."""
 
     def __init__(self, draws: Draws) -> None:
+        super().__init__("body", density=650.0)
         self.front = draws.pick("panel", {"slab": 0.7, "shaker": 0.15, "raised": 0.1, "planks": 0.05})
         self.overlay = draws.chance("overlay", 0.5)  # the fronts lie before the case, or within it
         self.handle = draws.pick("handle", {"bar": 0.24, "knob": 0.24, "bow": 0.16, "two knobs": 0.08, "none": 0.28})
@@ -37,19 +38,9 @@ class _Style:
         self.reach = draws.length("handle_reach", (0.015, 0.04))
         self.rise = draws.number("handle_rise", (-0.2, 0.3))  # of the handle above the front's middle, over its height
         self.side = draws.number("drawer_side", (0.6, 0.95))  # height of the drawer's sides over its front's
-        self.length = draws.number(
-            "drawer_length", (0.75, 1.0), (0.45, 1.0), tails=0.15
-        )  # of the drawer over the case's depth
+        self.length = draws.number("drawer_length", (0.75, 1.0), (0.45, 1.0), tails=0.15)  # over the case's depth
         self.travel = draws.number("travel", (0.65, 0.97), (0.35, 1.0), tails=0.3)  # over the drawer's length
-
-
-class _Furniture(Assembly):
-    """Furniture whose drawers are all of one style."""
-
-    def __init__(self, style: _Style) -> None:
-        super().__init__("body", density=650.0)
-        self.style = style
-        self.record(handles=style.handle != "none", legs=False)
+        self.record(handles=self.handle != "none", legs=False)
 
     def add_case(
         self, low: Vector, high: Vector, wall: float, grid: list[Array], rows: Sequence[str] = (), back: bool = False
@@ -62,50 +53,62 @@ class _Furniture(Assembly):
         """
         low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
         thin, (edges_y, edges_z) = wall / 4, grid
+        inner_low, inner_high = low + wall / 2, high - wall / 2
+        deep = (low[0], high[0] - thin)
         solid = tray(low, high, wall, wall / 2, axis=0, side=-1)
         for z in edges_z[1:-1]:
-            solid += box((low[0], high[0] - wall / 4), (low[1] + wall / 2, high[1] - wall / 2), (z - thin, z + thin))
+            solid += box(deep, (inner_low[1], inner_high[1]), (z - thin, z + thin))
         for y in edges_y[1:-1]:
-            solid += box((low[0], high[0] - wall / 4), (y - thin, y + thin), (low[2] + wall / 2, high[2] - wall / 2))
+            solid += box(deep, (y - thin, y + thin), (inner_low[2], inner_high[2]))
         for row in range(len(edges_z) - 2, -1, -1):
             content = rows[row] if rows else "drawer"
             for column in range(len(edges_y) - 1):
                 cell_low = np.array([low[0], edges_y[column] + thin, edges_z[row] + thin])
-                cell_high = np.array([high[0] - wall / 2, edges_y[column + 1] - thin, edges_z[row + 1] - thin])
+                cell_high = np.array([inner_high[0], edges_y[column + 1] - thin, edges_z[row + 1] - thin])
                 if content == "drawer":
-                    drawer, travel = self._drawer(cell_low + GAP, cell_high - GAP, wall)
-                    drawer = drawer.mirrored(0) if back else drawer
-                    ends, way = drawer.bounds(), 1.0 if back else -1.0
-                    origin = (ends[1 if back else 0, 0], *(0.5 * (ends[0] + ends[1])[1:]))
-                    slide = prismatic("body", (way, 0, 0), 0.0, travel, origin)
-                    self.add_numbered("drawer", drawer, slide, density=600.0)
+                    self._add_drawer(cell_low + GAP, cell_high - GAP, wall, back)
                 elif content == "fixed":
-                    face = low[0] - GAP - (_FRONT if self.style.overlay else 0.0)
+                    face = low[0] - GAP - (_FRONT if self.overlay else 0.0)
                     front_low = np.array([face, *(cell_low[1:] - thin / 2)])
                     front_high = np.array([low[0] + 0.01, *(cell_high[1:] + thin / 2)])
-                    solid += panel(self.style.front, front_low, front_high, 0.045, 0.006)
-                    solid += _handle(self.style, front_low, front_high)
+                    solid += self._front(front_low, front_high)
         self.body += solid.mirrored(0) if back else solid
 
-    def _drawer(self, low: Array, high: Array, wall: float) -> tuple[Solid, float]:
-        """Box open at the top behind a front with a handle, and how far it comes out."""
-        style = self.style
-        face = low[0] - _FRONT - 2 * GAP if style.overlay else low[0]
-        spread = wall / 4 if style.overlay else 0.0
+    def _add_drawer(self, low: Array, high: Array, wall: float, back: bool) -> None:
+        """Box open at the top behind a front with a handle."""
+        face = low[0] - _FRONT - 2 * GAP if self.overlay else low[0]
+        spread = wall / 4 if self.overlay else 0.0
         front_low = np.array([face, low[1] - spread, low[2] - spread])
         front_high = np.array([face + _FRONT, high[1] + spread, high[2] + spread])
-        length = style.length * (high[0] - low[0])
-        solid = panel(style.front, front_low, front_high, 0.045, 0.006)
-        side_top = low[2] + style.side * (high[2] - low[2])
-        solid += tray(
-            (face + _FRONT - 0.005, low[1] + 0.004, low[2]), (low[0] + length, high[1] - 0.004, side_top), 0.010
-        )
-        return solid + _handle(style, front_low, front_high), style.travel * length
+        length = self.length * (high[0] - low[0])
+        top = low[2] + self.side * (high[2] - low[2])
+        inner_low, inner_high = (face + _FRONT - 0.005, low[1] + 0.004, low[2]), (low[0] + length, high[1] - 0.004, top)
+        drawer = self._front(front_low, front_high, tray(inner_low, inner_high, 0.010))
+        ends, way = drawer.bounds(), 1.0 if back else -1.0
+        origin = (-way * ends[0, 0], *(0.5 * (ends[0] + ends[1])[1:]))
+        slide = prismatic("body", (way, 0, 0), 0.0, self.travel * length, origin)
+        self.add_numbered("drawer", drawer.mirrored(0) if back else drawer, slide, density=600.0)
+
+    def _front(self, low: Array, high: Array, behind: Solid | None = None) -> Solid:
+        """A front with its handle, and what stands behind it."""
+        width, height = high[1] - low[1], high[2] - low[2]
+        solid = panel(self.front, low, high, 0.045, 0.006) + (behind or Solid())
+        x, y, z = low[0], 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])
+        if self.front == "slab":
+            z += self.rise * height
+        sunken = 0.007 if self.front in ("shaker", "planks") and min(width, height) > 0.144 else 0.0
+        half = 0.5 * min(self.size * width, 0.35)
+        x, reach = x + sunken, self.reach + sunken
+        if "knob" in self.handle:
+            two = self.handle == "two knobs" and width >= 0.35
+            spots = [y - 0.28 * width, y + 0.28 * width] if two else [y]
+            return solid + union(knob((x, spot, z), FRONT, reach, min(0.018, 0.2 * height)) for spot in spots)
+        return solid + front_handle(self.handle, (x, y - half, z), (x, y + half, z), reach, min(0.006, 0.08 * height))
 
 
 def build(draws: Draws) -> Assembly:
     """A body with drawers that slide out towards -X, closed at rest."""
-    furniture = _Furniture(_Style(draws))
+    furniture = _Furniture(draws)
     kinds = {"chest": _chest, "table": _table, "desk": _desk}
     kinds[draws.pick("kind", {"chest": 0.45, "table": 0.3, "desk": 0.25})](draws, furniture)
     return furniture
@@ -127,27 +130,24 @@ def _chest(draws: Draws, furniture: _Furniture) -> None:
         columns, rows = max(1, min(columns, int(width / 0.2))), max(1, min(rows, int(height / 0.11)))
         if width > 6 * height and draws.chance("wide_grid", 0.7):
             columns = draws.integer("columns", 2, 4)
-    x0, x1, y, top = -depth / 2, depth / 2, width / 2, legs + height
+    x, y, top = depth / 2, width / 2, legs + height
     contents = ["drawer"] * rows
     if rows > 1 and draws.chance("mixed_rows", 0.3):  # the lower rows, the commonest first
         others = draws.integer("other_rows", 1, rows - 1)
         contents[:others] = [draws.pick("other_rows_are", {"open": 0.7, "fixed": 0.3})] * others
-    furniture.add_case(
-        (x0, -y, legs), (x1, y, top), wall,
-        [_widths(draws, -y + wall, y - wall, columns), _shares(draws, legs + wall, top - wall, rows)], contents,
-    )  # fmt: skip
+    grid = [_widths(draws, -y + wall, y - wall, columns), _shares(draws, legs + wall, top - wall, rows)]
+    furniture.add_case((-x, -y, legs), (x, y, top), wall, grid, contents)
     if draws.chance("top", 0.55):  # a top that stands over
         over = draws.length("top_overhang", (0.003, 0.04))
-        front = over + (_FRONT if furniture.style.overlay and draws.chance("top_over_fronts", 0.7) else 0.0)
+        front = over + (_FRONT if furniture.overlay and draws.chance("top_over_fronts", 0.7) else 0.0)
         thick = draws.length("top_thickness", (0.01, 0.035))
-        furniture.body += box((x0 - front, x1), y + over, (top - 0.001, top + thick), fillet=0.3 * thick)
+        furniture.body += box((-x - front, x), y + over, (top - 0.001, top + thick), fillet=0.3 * thick)
     if raised:
-        size = draws.length("leg_width", (0.02, 0.06))
-        furniture.body += _legs(draws, x0, x1, y, legs + 0.001, size)
+        furniture.body += _legs(draws, x, y, legs + 0.001, draws.length("leg_width", (0.02, 0.06)))
         furniture.record(legs=True)
     elif legs > 0.005:
         recess = draws.length("plinth_setback", (0.0, 0.05))
-        furniture.body += frame((x0 + recess, -y + 0.01, 0), (x1 - 0.01, y - 0.01, legs + 0.001), [wall] * 4, 0, 1)
+        furniture.body += frame((recess - x, -y + 0.01, 0), (x - 0.01, y - 0.01, legs + 0.001), [wall] * 4, 0, 1)
 
 
 def _table(draws: Draws, furniture: _Furniture) -> None:
@@ -160,22 +160,18 @@ def _table(draws: Draws, furniture: _Furniture) -> None:
     thick, over = draws.length("top_thickness", (0.015, 0.05)), draws.length("top_overhang", (0.0, 0.07))
     leg = height * draws.number("leg_width", (0.05, 0.13))
     over = min(over, width / 2 - leg - _NARROWEST / 2, depth / 2 - leg - _SHALLOWEST / 2)  # room between the legs
-    x0, x1, y = -depth / 2 + over, depth / 2 - over, width / 2 - over
-    top = height - thick
+    x, y, top = depth / 2 - over, width / 2 - over, height - thick
     apron = max(height * draws.number("apron_height", (0.11, 0.25)), 0.075)
     wall = draws.length("board", (0.012, 0.02))
-    furniture.body += _top(draws, depth, width, top, height) + _legs(draws, x0, x1, y, top + 0.001, leg)
+    furniture.body += _top(draws, depth, width, top, height) + _legs(draws, x, y, top + 0.001, leg)
     furniture.record(legs=True)
     between = y - leg + 0.002  # the apron reaches into the legs
     inset = draws.number("apron_inset", (0.0, 0.4)) * leg
-    span = max(
-        between * (1.0 if draws.chance("whole_apron", 0.6) else draws.number("case_width", (0.4, 0.9))), _NARROWEST / 2
-    )
-    middle = (
-        0.0
-        if draws.chance("centred", 0.8)
-        else {"right": -1.0, "left": 1.0}[draws.pick("aside", ["right", "left"])] * (between - span)
-    )
+    share = 1.0 if draws.chance("whole_apron", 0.6) else draws.number("case_width", (0.4, 0.9))
+    span = max(between * share, _NARROWEST / 2)
+    middle = 0.0
+    if not draws.chance("centred", 0.8):
+        middle = between - span if draws.pick("aside", ["right", "left"]) == "left" else span - between
     columns = int(np.clip(round(2 * span / draws.length("column_width", (0.25, 0.7))), 1, 4))
     sides = draws.pick("open_sides", {"front": 0.82, "back": 0.08, "both": 0.1})
     deepest = depth - 2 * over - 2 * inset - wall
@@ -186,23 +182,21 @@ def _table(draws: Draws, furniture: _Furniture) -> None:
     edges = _widths(draws, middle - span + wall, middle + span - wall, columns)
     for back in (False, True):
         if sides in ("both", ("front", "back")[back]):
-            furniture.add_case(
-                (x0 + inset, middle - span, top - apron), (x0 + inset + reach, middle + span, top + 0.001), wall,
-                [edges, np.array([top - apron + wall, top - wall])], back=back,
-            )  # fmt: skip
+            low, high = (inset - x, middle - span, top - apron), (inset - x + reach, middle + span, top + 0.001)
+            furniture.add_case(low, high, wall, [edges, np.array([top - apron + wall, top - wall])], back=back)
             for near, far in ((-between, middle - span + 0.002), (middle + span - 0.002, between)):
                 if far - near > 0.003:
-                    board = box((x0 + inset, x0 + inset + wall), (near, far), (top - apron, top + 0.001))
+                    board = box((inset - x, inset - x + wall), (near, far), (top - apron, top + 0.001))
                     furniture.body += board.mirrored(0) if back else board
         else:
-            board = box((x1 - inset - wall, x1 - inset), between, (top - apron, top + 0.001))
+            board = box((x - inset - wall, x - inset), between, (top - apron, top + 0.001))
             furniture.body += board if back else board.mirrored(0)
     for side in (-1, 1):
         beside = side * (y - inset), side * (y - inset - wall)
-        furniture.body += box((x0 + leg - 0.002, x1 - leg + 0.002), beside, (top - apron, top + 0.001))
-    if draws.chance("shelf", 0.25):  # a shelf between the legs
+        furniture.body += box(x - leg + 0.002, beside, (top - apron, top + 0.001))
+    if draws.chance("shelf", 0.25):
         z = draws.number("shelf_height", (0.12, 0.35)) * height
-        furniture.body += box((x0 + 0.25 * leg, x1 - 0.25 * leg), y - 0.25 * leg, (z, z + 0.018))
+        furniture.body += box(x - 0.25 * leg, y - 0.25 * leg, (z, z + 0.018))
 
 
 def _desk(draws: Draws, furniture: _Furniture) -> None:
@@ -211,17 +205,17 @@ def _desk(draws: Draws, furniture: _Furniture) -> None:
     width, depth = height * draws.number("width", (1.4, 2.4)), height * draws.number("depth", (0.55, 1.0))
     thick, over = draws.length("top_thickness", (0.018, 0.05)), draws.length("top_overhang", (0.0, 0.05))
     wall = draws.length("board", (0.014, 0.022))
-    x0, x1, y, top = -depth / 2 + over, depth / 2 - over, width / 2 - over, height - thick
+    x, y, top = depth / 2 - over, width / 2 - over, height - thick
     furniture.body += _top(draws, depth, width, top, height)
     pedestal = min(draws.length("pedestal_width", (0.28, 0.45)), 0.4 * width)
     sides = PEDESTALS[draws.pick("pedestals", {"right": 0.35, "left": 0.35, "both": 0.3})]
     on_legs = draws.chance("on_legs", 0.4)
     leg = draws.length("leg_width", (0.035, 0.07))
-    low = (
-        height * draws.number("pedestal_bottom", (0.1, 0.6))
-        if on_legs
-        else (0.0 if draws.chance("on_floor", 0.5) else draws.length("plinth_height", (0.03, 0.1)))
-    )
+    low = 0.0
+    if on_legs:
+        low = height * draws.number("pedestal_bottom", (0.1, 0.6))
+    elif not draws.chance("on_floor", 0.5):
+        low = draws.length("plinth_height", (0.03, 0.1))
     outer = y - leg + 0.002 if on_legs else y
     if len(sides) == 2:
         pedestal = min(pedestal, outer - 0.1)  # room for knees
@@ -234,40 +228,32 @@ def _desk(draws: Draws, furniture: _Furniture) -> None:
         rows, contents = 2, ["open", "drawer"]
     levels = _shares(draws, low + wall, top - wall, rows)
     if contents[0] == "open" and top - low > 0.3:  # the open compartment is higher than the drawers
-        levels = np.concatenate(
-            [
-                levels[:1],
-                np.linspace(low + wall + draws.number("open_height", (0.4, 0.7)) * (top - low), top - wall, rows),
-            ]
-        )
+        bottom = low + wall + draws.number("open_height", (0.4, 0.7)) * (top - low)
+        levels = np.concatenate([levels[:1], np.linspace(bottom, top - wall, rows)])
     for side in sides:
         near, far = sorted((side * outer, side * (outer - pedestal)))
-        furniture.add_case(
-            (x0, near, low), (x1, far, top + 0.001), wall, [np.array([near + wall, far - wall]), levels], contents
-        )
+        grid = [np.array([near + wall, far - wall]), levels]
+        furniture.add_case((-x, near, low), (x, far, top + 0.001), wall, grid, contents)
         if not on_legs and low > 0:
-            furniture.body += frame((x0 + 0.03, near + 0.01, 0), (x1 - 0.01, far - 0.01, low + 0.001), [wall] * 4, 0, 1)
+            furniture.body += frame((0.03 - x, near + 0.01, 0), (x - 0.01, far - 0.01, low + 0.001), [wall] * 4, 0, 1)
     left = -outer + (pedestal if -1 in sides else wall) - 0.002
     right = outer - (pedestal if 1 in sides else wall) + 0.002
     if on_legs:
         furniture.record(legs=True)
-        furniture.body += _legs(draws, x0, x1, y, top + 0.001, leg)
+        furniture.body += _legs(draws, x, y, top + 0.001, leg)
     elif len(sides) == 1:  # a panel holds the other end
         edge = -sides[0] * y
-        furniture.body += box((x0, x1), (edge, edge + sides[0] * wall), (0, top))
-    if on_legs or draws.chance("back_panel", 0.7):  # a board at the back
-        furniture.body += box(
-            (x1 - 0.06, x1 - 0.04),
-            (left, right),
-            (top - draws.number("back_panel_height", (0.15, 0.9)) * (top - low), top + 0.001),
-        )
+        furniture.body += box(x, (edge, edge + sides[0] * wall), (0, top))
+    if on_legs or draws.chance("back_panel", 0.7):
+        drop = draws.number("back_panel_height", (0.15, 0.9)) * (top - low)
+        furniture.body += box((x - 0.06, x - 0.04), (left, right), (top - drop, top + 0.001))
     if draws.chance("flat_case", 0.5):
         flat = draws.length("flat_case_height", (0.08, 0.13))
         columns = draws.pick("columns", {1: 0.7, 2: 0.3})
         edges = np.linspace(left + wall, right - wall, columns + 1)
-        far = x1 - max(0.058, draws.number("flat_case_setback", (0.05, 0.3)) * depth)
+        far = x - max(0.058, draws.number("flat_case_setback", (0.05, 0.3)) * depth)
         levels = np.array([top - flat + wall, top - wall])
-        furniture.add_case((x0, left, top - flat), (far, right, top + 0.001), wall, [edges, levels])
+        furniture.add_case((-x, left, top - flat), (far, right, top + 0.001), wall, [edges, levels])
 
 
 def _shares(draws: Draws, low: float, high: float, rows: int) -> Array:
@@ -275,7 +261,7 @@ def _shares(draws: Draws, low: float, high: float, rows: int) -> Array:
     pattern = draws.pick("row_pattern", {"equal": 0.5, "random": 0.3, "growing": 0.2})
     random = draws.rng.dirichlet([12.0] * rows)
     growing = np.linspace(draws.number("row_growth", (1.2, 2.0)), 1.0, rows)
-    return _levels(low, high, {"equal": np.ones(rows), "random": random, "growing": growing}[pattern])
+    return levels(low, high, {"equal": np.ones(rows), "random": random, "growing": growing}[pattern], 0.6)
 
 
 def _widths(draws: Draws, low: float, high: float, columns: int) -> Array:
@@ -284,14 +270,7 @@ def _widths(draws: Draws, low: float, high: float, columns: int) -> Array:
     half = draws.numbers("column_share", 0.7, 1.5, (columns + 1) // 2)
     mirrored = np.concatenate([half, half[: columns // 2][::-1]])
     random = draws.rng.dirichlet([12.0] * columns)
-    return _levels(low, high, {"equal": np.ones(columns), "mirrored": mirrored, "random": random}[pattern])
-
-
-def _levels(low: float, high: float, shares: Array) -> Array:
-    """(n + 1,) levels that divide a range in these proportions, none much less than an equal share."""
-    shares = np.maximum(shares / shares.sum(), 0.6 / len(shares))
-    levels: Array = low + np.concatenate([[0.0], np.cumsum(shares) / shares.sum()]) * (high - low)
-    return levels
+    return levels(low, high, {"equal": np.ones(columns), "mirrored": mirrored, "random": random}[pattern], 0.6)
 
 
 def _top(draws: Draws, depth: float, width: float, low: float, high: float) -> Solid:
@@ -302,45 +281,24 @@ def _top(draws: Draws, depth: float, width: float, low: float, high: float) -> S
     return box(*corners, fillet=radius)
 
 
-def _legs(draws: Draws, x0: float, x1: float, y: float, height: float, size: float) -> Solid:
+def _legs(draws: Draws, x: float, y: float, height: float, size: float) -> Solid:
     """Four legs with their outer edges on a rectangle: square or round, straight, tapered or turned."""
     kind = draws.pick("leg_shape", {"square": 0.35, "tapered": 0.25, "round": 0.25, "turned": 0.15})
     taper = draws.number("leg_taper", (0.45, 0.9))
-    half, middle = size / 2, 0.5 * (x0 + x1)
-    solid = Solid()
-    for x in (x0 + half, x1 - half):
-        for w in (-y + half, y - half):
+    half, solid = size / 2, Solid()
+    for u in (half - x, x - half):
+        for v in (half - y, y - half):
+            beside = about(u, half), about(v, half)
             if kind == "square":
-                solid += box((x - half, x + half), (w - half, w + half), (0, height))
+                solid += box(*beside, (0, height))
             elif kind == "round":
-                solid += rod(x, w, (0, height), half * taper, half, 16)
+                solid += rod(u, v, (0, height), half * taper, half, 16)
             elif kind == "tapered":  # below a straight block, its outer faces upright
-                block = box((x - half, x + half), (w - half, w + half), (0.75 * height, height))
-                foot = taper * half
-                corner = (x + np.sign(x - middle) * (half - foot), w + np.sign(w) * (half - foot), 0.0)
+                block, foot = box(*beside, (0.75 * height, height)), taper * half
+                corner = (u + np.sign(u) * (half - foot), v + np.sign(v) * (half - foot), 0.0)
                 solid += block + hull_of(block, box(foot, foot, (0, 0.01)).moved(corner))
             else:
-                levels = np.array([0.0, 0.03, 0.1, 0.45, 0.5, 0.53, 0.56, 0.7]) * height
                 radii = half * np.array([0.5, 0.8, 0.5, 0.95, 0.6, 0.9, 0.6, 1.0])
-                solid += tube(np.column_stack([np.full(8, x), np.full(8, w), levels]), radii.tolist(), 12)
-                solid += box((x - half, x + half), (w - half, w + half), (0.69 * height, height))
+                path = [(u, v, share * height) for share in (0.0, 0.03, 0.1, 0.45, 0.5, 0.53, 0.56, 0.7)]
+                solid += tube(path, radii.tolist(), 12) + box(*beside, (0.69 * height, height))
     return solid
-
-
-def _handle(style: _Style, low: Array, high: Array) -> Solid:
-    width, height = high[1] - low[1], high[2] - low[2]
-    x, y = low[0], 0.5 * (low[1] + high[1])
-    z = 0.5 * (low[2] + high[2])
-    if style.front == "slab":
-        z += style.rise * height
-    sunken = 0.007 if style.front in ("shaker", "planks") and min(width, height) > 0.144 else 0.0
-    half = 0.5 * min(style.size * width, 0.35)
-    radius = min(0.006, 0.08 * height)
-    x, reach = x + sunken, style.reach + sunken
-    if style.handle in ("bar", "bow"):
-        return front_handle(style.handle, (x, y - half, z), (x, y + half, z), reach, radius)
-    if style.handle == "none":
-        return Solid()
-    two = style.handle == "two knobs" and width >= 0.35
-    spots = [(x, y + s * 0.28 * width, z) for s in (-1, 1)] if two else [(x, y, z)]
-    return union(knob(spot, FRONT, reach, min(0.018, 0.2 * height)) for spot in spots)

@@ -10,6 +10,7 @@ from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
 from artsim.making.outlines import Vector, about
 from artsim.making.solids import Solid, box, cylinder, hull_of, rod, tube, union
+from artsim.model.kinematics import Array
 
 GAP = 0.003
 PEDESTALS = {"right": (-1,), "left": (1,), "both": (-1, 1)}
@@ -54,8 +55,7 @@ def _divided(draws: Draws, cell: Cell, axis: int, count: int, style: Style) -> t
     room = cell.sides[axis]
     count = max(1, min(count, int(room / (0.16 if axis == 0 else 0.085))))
     shares = np.ones(count) if draws.chance("equal_cells", 0.5) else draws.numbers("cell_share", 0.7, 1.5, count)
-    shares = np.maximum(shares / shares.sum(), 0.75 / count)  # the least still holds a drawer
-    edges = cell.low[axis] + np.concatenate([[0.0], np.cumsum(shares) / shares.sum()]) * room
+    edges = levels(cell.low[axis], cell.high[axis], shares, 0.75)  # the least still holds a drawer
     half = style.board / 2
     cells = []
     for k in range(count):
@@ -63,6 +63,13 @@ def _divided(draws: Draws, cell: Cell, axis: int, count: int, style: Style) -> t
         last = edges[k + 1] - (half if k < count - 1 else 0.0)
         cells.append(cell.between(axis, float(first), float(last)))
     return cells, fronts.boards_across(cell, style, axis, edges[1:-1])
+
+
+def levels(low: float, high: float, shares: Array, least: float) -> Array:
+    """(N + 1,) levels that divide a range in N proportions, each at least so much of an equal share."""
+    shares = np.maximum(shares / shares.sum(), least / len(shares))
+    edges: Array = low + np.concatenate([[0.0], np.cumsum(shares) / shares.sum()]) * (high - low)
+    return edges
 
 
 def _fill(draws: Draws, cell: Cell, style: Style, doors: float, must_move: bool) -> tuple[Solid, list[Moving]]:
