@@ -24,7 +24,7 @@ from artsim.families.table_parts import (
 )
 from artsim.making.assembly import Assembly, prismatic, revolute, swivel
 from artsim.making.draws import Draws
-from artsim.making.outlines import UP, about, lifted, superellipse, turns
+from artsim.making.outlines import UP, about, ends, lifted, superellipse, turns
 from artsim.making.solids import Solid, box, hull_of, loft, ring, rod, union
 
 LEAST_SHARES, MOST_SHARES = (0.105, 0.27, 0.12), (0.79, 0.985, 0.94)
@@ -65,16 +65,13 @@ def _apron(draws: Draws, table: Assembly) -> None:
     """Legs with a low case between them under the top; leaves at the ends, a shelf below, wheels."""
     height = draws.length("height", (0.32, 0.95))
     width, depth = height * draws.number("width", (0.65, 3.4)), height * draws.number("depth", (0.4, 1.7))
-    depth = float(np.clip(depth, 0.3, 1.1))
-    width = float(np.clip(width, 0.34, 2.4))
+    width, depth = float(np.clip(width, 0.34, 2.4)), float(np.clip(depth, 0.3, 1.1))
     if draws.chance("unusual", 0.3):
         depth, width, height = unusual_sides(draws, LEAST_SHARES, MOST_SHARES, (0.28, 0.34, 0.3))
     thick, over = draws.length("top_thickness", (0.014, 0.06)), draws.length("top_overhang", (0.0, 0.06))
-    size = height * draws.number("leg_width", (0.04, 0.12))
-    size = min(size, 0.2 * depth, 0.15 * width)
+    size = min(height * draws.number("leg_width", (0.04, 0.12)), 0.2 * depth, 0.15 * width)
     over = min(over, 0.12 * depth)
-    top = height - thick
-    x, y = depth / 2 - over, width / 2 - over
+    top, x, y = height - thick, depth / 2 - over, width / 2 - over
     apron = min(max(height * draws.number("apron_height", (0.12, 0.32)), 0.09), 0.5 * height)
     rolling = draws.chance("rolling", 0.12)
     foot = 0.07 if rolling else 0.0
@@ -107,7 +104,7 @@ def _apron(draws: Draws, table: Assembly) -> None:
     if draws.chance("drop_leaves", 0.1):
         drop_leaves(draws, table, depth, width, top, height)
     if rolling:
-        wheels(table, [(sx * (x - 0.5 * size), sy * (y - 0.5 * size)) for sx in (-1, 1) for sy in (-1, 1)], foot, size)
+        wheels(table, [(u, v) for u in ends(x - 0.5 * size) for v in ends(y - 0.5 * size)], foot, size)
 
 
 def _pedestals(draws: Draws, table: Assembly) -> None:
@@ -167,7 +164,7 @@ def _pedestals(draws: Draws, table: Assembly) -> None:
         add_case(draws, table, low, high, style, (draws.integer("columns", 1, 3), 1), 0.0)
     elif between == "tray":
         keyboard_tray(draws, table, front, near, far, top, 0.6 * deep)
-    if draws.chance("top_shelves", 0.15):  # shelves on the top
+    if draws.chance("top_shelves", 0.15):
         rise, back = draws.length("top_shelf_height", (0.2, 0.5)), x - draws.length("top_shelf_depth", (0.18, 0.3))
         table.body += union(box((back, x), (yy, yy + 0.02), (height - 0.001, height + rise)) for yy in (-y, y - 0.02))
         table.body += box((back, x), y, (height + rise - 0.02, height + rise))
@@ -177,29 +174,25 @@ def _case(draws: Draws, table: Assembly) -> None:
     """A low table or a console: one case from side to side on legs, a plinth or wheels."""
     height = draws.length("height", (0.3, 0.95))
     width, depth = height * draws.number("width", (0.6, 3.2)), height * draws.number("depth", (0.4, 1.6))
-    depth = float(np.clip(depth, 0.28, 0.9))
-    width = max(width, 0.34)
+    width, depth = max(width, 0.34), float(np.clip(depth, 0.28, 0.9))
     if draws.chance("unusual", 0.45):
         depth, width, height = unusual_sides(draws, LEAST_SHARES, MOST_SHARES, (0.28, 0.34, 0.28))
     thick, over = draws.length("top_thickness", (0.012, 0.05)), draws.length("top_overhang", (0.0, 0.05))
     top, x, y = height - thick, depth / 2 - min(over, 0.1 * depth), width / 2 - over
     style = _style(draws, depth > width)
     stand = draws.pick("stand", {"legs": 0.55, "plinth": 0.3, "wheels": 0.15})
-    low = {"legs": draws.number("leg_height", (0.12, 0.65)), "plinth": draws.number("plinth_height", (0.03, 0.2))}.get(
-        stand, 0.0
-    ) * height
+    legs, plinth = draws.number("leg_height", (0.12, 0.65)), draws.number("plinth_height", (0.03, 0.2))
+    low = {"legs": legs, "plinth": plinth, "wheels": 0.0}[stand] * height
     low = 0.07 if stand == "wheels" else min(low, top - 0.12)
     ahead = style.thickness + 0.004 if style.overlay else 0.0
     table.body += table_top(draws, depth, width, top, height)
     rows = draws.integer("rows", 1, 3)
     columns = max(1, min(4, int(width / draws.length("column_width", (0.3, 0.7)))))
     both = draws.chance("both_sides", 0.1) and depth > 0.5
-    end = -0.002 if both else x
-    for back in (False, True):
-        if both or not back:
-            corners = (-x + ahead, -y, low), (end, y, top + 0.001)
-            doors = draws.pick("door_share", [0.0, 0.5, 1.0])
-            add_case(draws, table, *corners, style, (columns, rows), doors, back, free=(True, True))
+    corners = (-x + ahead, -y, low), (-0.002 if both else x, y, top + 0.001)
+    for back in (False, True)[: 1 + both]:
+        doors = draws.pick("door_share", [0.0, 0.5, 1.0])
+        add_case(draws, table, *corners, style, (columns, rows), doors, back, free=(True, True))
     size = draws.length("leg_width", (0.02, 0.05))
     if stand == "legs":
         table.body += four_legs(draws, x - ahead, y, 0.0, low + 0.002, size, splay=draws.chance("legs_splayed", 0.3))
@@ -207,7 +200,7 @@ def _case(draws: Draws, table: Assembly) -> None:
         inset = draws.length("plinth_setback", (0.01, 0.06))
         table.body += box((-x + ahead + inset, x - inset), y - inset, (0.0, low + 0.001))
     else:
-        wheels(table, [(sx * (x - 0.06), sy * (y - 0.06)) for sx in (-1, 1) for sy in (-1, 1)], low, 0.05)
+        wheels(table, [(u, v) for u in ends(x - 0.06) for v in ends(y - 0.06)], low, 0.05)
 
 
 def _column(draws: Draws, table: Assembly) -> None:
@@ -220,20 +213,15 @@ def _column(draws: Draws, table: Assembly) -> None:
     outline = superellipse(power, wide, long, 32)
 
     def slab(z: float) -> Solid:
-        rings = [
-            lifted(k * outline, h)
-            for k, h in ((0.96, z), (1.0, z + 0.3 * thick), (1.0, z + 0.8 * thick), (0.98, z + thick))
-        ]
-        return loft(rings)
+        sections = ((0.96, z), (1.0, z + 0.3 * thick), (1.0, z + 0.8 * thick), (0.98, z + thick))
+        return loft([lifted(share * outline, level) for share, level in sections])
 
     radius = draws.length("column_radius", (0.022, 0.06))
     feet = draws.pick("feet", [0, 3, 4, 5])
     rolling = feet > 2 and draws.chance("rolling", 0.4)
     foot = 0.06 if rolling else 0.0
     span = wide * draws.number("foot_reach", (0.55, 0.9))
-    base = Solid()
-    low = foot + 0.05
-    spots = []
+    base, low, spots = Solid(), foot + 0.05, []
     for angle in turns(feet, 0.5):
         leg = hull_of(
             box((0, 0.01), 0.6 * radius, (low, low + draws.length("foot_height", (0.05, 0.15)))),
@@ -246,8 +234,7 @@ def _column(draws: Draws, table: Assembly) -> None:
     kind = draws.pick("top_moves", ["turning", "tipping", "rising"])
     top = height - thick
     if kind == "rising":
-        sleeve = 0.62 * top
-        inner = 0.7 * radius
+        sleeve, inner = 0.62 * top, 0.7 * radius
         base += ring((0, 0, 0.5 * (low + sleeve)), UP, inner + GAP, radius + GAP, sleeve - low, 16)
         base += rod(0, 0, (foot + 0.01, low + 0.01), radius + GAP)
         travel = draws.number("rise", (0.3, 0.6)) * (sleeve - low)
@@ -256,21 +243,19 @@ def _column(draws: Draws, table: Assembly) -> None:
     elif kind == "turning":
         base += rod(0, 0, (foot + 0.01, top - GAP), radius)
         base += rod(0, 0, (top - 0.02 - GAP, top - GAP), min(3 * radius, 0.5 * wide))
-        table.add_numbered(
-            "top", slab(top), swivel("body", UP, (0, 0, top), None if draws.chance("turns_freely", 0.6) else 1.57)
-        )
+        limit = None if draws.chance("turns_freely", 0.6) else 1.57
+        table.add_numbered("top", slab(top), swivel("body", UP, (0, 0, top), limit))
     else:
         base += rod(0, 0, (foot + 0.01, top - 0.05), radius)
         base += box((-radius, 0.5 * radius), radius, (top - 0.06, top - 0.02))
         hinge = (radius + 0.01, 0.0, top - 0.03)
-        lugs = union(
-            box(about(hinge[0], 0.01), about(t * 1.3 * radius, 0.008), (top - 0.04, top + 0.002)) for t in (-1, 1)
-        )
+        lugs = Solid()
+        for y in (-1.3 * radius, 1.3 * radius):
+            lugs += box(about(hinge[0], 0.01), about(y, 0.008), (top - 0.04, top + 0.002))
         base += box((0.0, hinge[0] + 0.005), 1.1 * radius, (top - 0.04, top - 0.025))
         # Beyond the hinge's axis the top comes down before the column.
-        table.add_numbered(
-            "top", slab(top) + lugs, revolute("body", (0, 1, 0), hinge, 0.0, draws.angle("top_angle", (0.5, 0.9)))
-        )
+        tip = revolute("body", (0, 1, 0), hinge, 0.0, draws.angle("top_angle", (0.5, 0.9)))
+        table.add_numbered("top", slab(top) + lugs, tip)
     table.body += base
     if rolling:
         wheels(table, spots, foot, 0.03)

@@ -109,17 +109,15 @@ def table_top(draws: Draws, depth: float, width: float, low: float, high: float)
 def four_legs(draws: Draws, x: float, y: float, low: float, high: float, size: float, splay: bool) -> Solid:
     """Four legs within a rectangle: square, tapered, round, turned or a loop at either end."""
     kind = draws.pick("leg_shape", {"square": 0.3, "tapered": 0.22, "round": 0.22, "turned": 0.13, "loops": 0.13})
-    half, taper = size / 2, draws.number("leg_taper", (0.4, 0.9))
-    tall = high - low
+    half, taper, tall = size / 2, draws.number("leg_taper", (0.4, 0.9)), high - low
     out = min(0.12 * tall, 0.2 * min(x, y)) if splay and kind in ("tapered", "round") else 0.0
     solid = Solid()
-    if kind == "loops":
-        for s in (-1, 1):
-            beside = s * y, s * (y - size)
+    for sx in (-1, 1):
+        if kind == "loops":
+            beside = sx * y, sx * (y - size)
             solid += union(box((u, u + size), beside, (low, high)) for u in (-x, x - size))
             solid += box(x, beside, (low, low + 0.7 * size))
-        return solid
-    for sx in (-1, 1):
+            continue
         for sy in (-1, 1):
             head = np.array([sx * (x - half), sy * (y - half), high])
             foot = head + (sx * out, sy * out, -tall)
@@ -127,27 +125,24 @@ def four_legs(draws: Draws, x: float, y: float, low: float, high: float, size: f
                 solid += box(foot - (half, half, 0), head + (half, half, 0))
             elif kind == "round":
                 solid += cylinder(foot, head, taper * half, half, 16)
+            elif kind == "tapered" and out:
+                solid += cylinder(foot, head, taper * half, 1.2 * half, 4)
             elif kind == "tapered":
-                if out:
-                    solid += cylinder(foot, head, taper * half, 1.2 * half, 4)
-                    continue
                 below = box(foot - (taper * half, taper * half, 0), foot + (taper * half, taper * half, 0.01))
                 solid += hull_of(below, box(head - (half, half, 0.25 * tall), head + (half, half, 0)))
             else:
-                levels = low + np.array([0.0, 0.05, 0.12, 0.5, 0.56, 0.62, 0.75, 1.0]) * tall
+                path = [(*head[:2], low + share * tall) for share in (0.0, 0.05, 0.12, 0.5, 0.56, 0.62, 0.75, 1.0)]
                 radii = half * np.array([0.55, 0.85, 0.5, 0.95, 0.6, 0.95, 1.0, 1.0])
-                path = np.column_stack([np.full(8, head[0]), np.full(8, head[1]), levels])
                 solid += tube(path, radii.tolist(), 10)
     return solid
 
 
 def drop_leaves(draws: Draws, table: Assembly, depth: float, width: float, top: float, height: float) -> None:
     """Leaves at one or both ends that hang down when they turn."""
-    long = draws.number("leaf_length", (0.15, 0.4)) * width
-    long = min(long, top - 0.05)
+    long = min(draws.number("leaf_length", (0.15, 0.4)) * width, top - 0.05)
     for side in (-1, 1)[: draws.integer("leaves", 1, 2)]:
         near, far = side * (width / 2 + GAP), side * (width / 2 + GAP + long)
-        leaf = box(depth / 2, (min(near, far), max(near, far)), (top, height), fillet=0.2 * (height - top))
+        leaf = box(depth / 2, (near, far), (top, height), fillet=0.2 * (height - top))
         joint = revolute(
             "body", (-side, 0, 0), (0.0, near, top), 0.0, np.pi / 2 * draws.number("leaf_angle", (0.9, 1.0))
         )
@@ -158,10 +153,8 @@ def keyboard_tray(
     draws: Draws, table: Assembly, front: float, near: float, far: float, top: float, deep: float
 ) -> None:
     """A board that slides out below the top between two rails."""
-    room = far - near
-    wide = room * draws.number("tray_width", (0.6, 0.96))
-    middle = 0.5 * (near + far)
-    y0, y1 = middle - 0.5 * wide, middle + 0.5 * wide
+    half, middle = 0.5 * (far - near) * draws.number("tray_width", (0.6, 0.96)), 0.5 * (near + far)
+    y0, y1 = middle - half, middle + half
     z = top - draws.length("tray_drop", (0.07, 0.12))
     for y in (y0 - 0.012, y1):
         table.body += box((front + 0.01, front + deep), (y, y + 0.012), (z - 0.005, top + 0.001))
@@ -178,8 +171,8 @@ def wheels(table: Assembly, spots: list[tuple[float, float]], height: float, siz
         across = (y - half - thick - 0.002, y + half + thick + 0.002)
         body = box(about(x, 0.5 * radius), across, (height - 0.1 * radius, height + 0.012))
         for s in (-1, 1):
-            a, b = sorted((y + s * (half + 0.002), y + s * (half + 0.002 + thick)))
-            body += box((x - 0.35 * radius, x + 0.35 * radius), (a, b), (0.7 * radius, height))
+            beside = y + s * (half + 0.002), y + s * (half + 0.002 + thick)
+            body += box((x - 0.35 * radius, x + 0.35 * radius), beside, (0.7 * radius, height))
         body += rod(x, y, (height - 0.001, height + 0.01), 0.4 * size, sections=12)
         table.body += body
         wheel = rod(x, (y - half, y + half), radius, radius, sections=18)
