@@ -77,15 +77,14 @@ class Style:
 def drawer(draws: Draws, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     """A drawer that slides out towards -X."""
     low, high = _front_box(cell, style)
-    solid = _face(low, high, style)
-    height = high[2] - low[2]
+    solid = panel(style.panel, low, high, style.rail, style.recess)
     depth = style.back - high[0] - 0.01
     wall, clear = 0.009, 0.005
     bottom = cell.low[1] + clear
     top = bottom + (cell.sides[1] - 2 * clear) * draws.number("drawer_side", (0.55, 0.9))
     solid += tray((high[0] - 0.001, cell.low[0] + clear, bottom), (high[0] + depth, cell.high[0] - clear, top), wall)
     middle = 0.5 * (low + high)
-    rise = height * draws.pick("handle_rise", [0.0, 0.0, 0.25])
+    rise = (high[2] - low[2]) * draws.pick("handle_rise", [0.0, 0.0, 0.25])
     half = 0.5 * min(style.handle_length, 0.75 * (high[1] - low[1]))
     solid += _handle(style, (low[0], middle[1], middle[2] + rise), 1, half, low, high)
     return Solid(), [("drawer", solid, prismatic("body", FRONT, 0.0, style.travel * depth, tuple(middle)))]
@@ -130,13 +129,10 @@ def sliding_doors(draws: Draws, cell: Cell, style: Style) -> tuple[Solid, list[M
             solid += _handle(style, grip, 2, min(0.5 * style.handle_length, 0.3 * (high[2] - low[2])), low, high)
         else:
             radius = min(0.4 * style.rail, 0.02)
-            solid += cylinder(grip, np.subtract(grip, (0.001, 0, 0)), radius) + cylinder(
-                grip, np.add(grip, (0.003, 0, 0)), radius
-            )
-        center = tuple(0.5 * (low + high))
-        leaves.append(("sliding_door", solid, prismatic("body", (0, -side, 0), 0.0, travel, center)))
-    depth = 2 * (thickness + clear) + clear
-    return _shelves(draws, cell, style.face + depth + 0.015, style), leaves
+            for depth in (-0.001, 0.003):
+                solid += cylinder(grip, np.add(grip, (depth, 0, 0)), radius)
+        leaves.append(("sliding_door", solid, prismatic("body", (0, -side, 0), 0.0, travel, tuple(0.5 * (low + high)))))
+    return _shelves(draws, cell, style.face + (2 * (thickness + clear) + clear) + 0.015, style), leaves
 
 
 def shelves(draws: Draws, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
@@ -151,7 +147,7 @@ def fixed(draws: Draws, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
     joint = box(low + margin + (0.5 * style.thickness, 0, 0), high - margin + (2 * GAP, 0, 0))
     if not style.overlay:
         joint = box(low - 2 * margin + (0.4 * style.thickness, 0, 0), high + 2 * margin)
-    return _face(low, high, style) + joint, []
+    return panel(style.panel, low, high, style.rail, style.recess) + joint, []
 
 
 @deferred
@@ -189,15 +185,13 @@ def _interior(draws: Draws, cell: Cell, style: Style) -> tuple[Solid, list[Movin
 def _shelves(draws: Draws, cell: Cell, front: float, style: Style) -> Solid:
     width, height = cell.sides
     count = draws.integer("shelves", 0, int(height // 0.2)) if height > 0.2 else 0
-    solid = Solid()
-    thick = min(style.board, 0.018)
+    solid, half = Solid(), min(style.board, 0.018) / 2
+    deep = (front, style.back + 0.001)
     for z in np.linspace(cell.low[1], cell.high[1], count + 2)[1:-1]:
-        across = (cell.low[0] - 0.001, cell.high[0] + 0.001)
-        solid += box((front, style.back + 0.001), across, about(z, thick / 2))
+        solid += box(deep, (cell.low[0] - 0.001, cell.high[0] + 0.001), about(z, half))
     if count == 0 and width > 0.8 and draws.chance("partition", 0.5):
         y = 0.5 * (cell.low[0] + cell.high[0])
-        upright = (cell.low[1] - 0.001, cell.high[1] + 0.001)
-        solid += box((front, style.back + 0.001), about(y, thick / 2), upright)
+        solid += box(deep, about(y, half), (cell.low[1] - 0.001, cell.high[1] + 0.001))
     return solid
 
 
@@ -218,17 +212,13 @@ def _front_box(cell: Cell, style: Style) -> tuple[Array, Array]:
     )
 
 
-def _face(low: Array, high: Array, style: Style) -> Solid:
-    return panel(style.panel, low, high, style.rail, style.recess)
-
-
 def _leaf(draws: Draws, cell: Cell, style: Style, hinge: str, low: Array, high: Array) -> Moving:
     """A hinged panel with its handle near the edge that opens."""
     across, end, axis = HINGES[hinge]
     along = 3 - across
     edge = high[across] if end > 0 else low[across]
     width, length = high[across] - low[across], high[along] - low[along]
-    solid = _face(low, high, style)
+    solid = panel(style.panel, low, high, style.rail, style.recess)
 
     run = across if style.level and across == 1 else along  # the axis along which the handle lies
     half = 0.5 * min(style.handle_length, 0.6 * (width if run == across else length))

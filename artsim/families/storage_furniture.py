@@ -72,9 +72,7 @@ def _style(draws: Draws, kind: str, depth: float) -> Style:
         rail=draws.length("rail", (0.035, 0.075)),
         recess=draws.length("recess", (0.005, 0.009)),
         handle=draws.pick("handle", {"bar": 0.3, "bow": 0.2, "knob": 0.22, "block": 0.08, "cup": 0.08, "none": 0.12}),
-        handle_length=draws.length(
-            "handle_length", (0.08, 0.35) if draws.chance("short_handles", 0.8) else (0.35, 0.8)
-        ),
+        handle_length=draws.length("handle_length", (0.08, 0.35) if draws.chance("short_bars", 0.8) else (0.35, 0.8)),
         reach=draws.length("handle_reach", (0.018, 0.04)),
         grip=draws.length("handle_radius", (0.004, 0.008)),
         travel=draws.number("travel", (0.5, 0.88)),
@@ -140,77 +138,71 @@ def _carcass(
     draws: Draws, kind: str, width: float, depth: float, height: float, stand: float, style: Style, furniture: Assembly
 ) -> Solid:
     """Outer boards, top and what it stands on."""
-    x0, x1, y, board = style.face, depth / 2, width / 2, style.board
-    top = stand + height
+    x, y, board, top = depth / 2, width / 2, style.board, stand + height
     to_floor = stand > 0 and draws.chance("sides_to_floor", 0.3)
-    sides_from = 0.0 if to_floor else stand
-    solid = box((style.back, x1), y - 0.001, (stand + 0.001, top - 0.001))
-    solid += union(box((x0, x1), about(s, board / 2), (sides_from, top)) for s in (board / 2 - y, y - board / 2))
-    solid += box((x0, x1), y - 0.001, (stand, stand + board))
+    upright, across = (0.0 if to_floor else stand, top), y - 0.001
+    solid = box((style.back, x), across, (stand + 0.001, top - 0.001))
+    solid += union(box(x, about(s, board / 2), upright) for s in (board / 2 - y, y - board / 2))
+    solid += box(x, across, (stand, stand + board))
     if kind == "base" and draws.chance("worktop_rails", 0.4):  # open at the top, with rails for a worktop
         rail = draws.length("worktop_rail_depth", (0.06, 0.12))
-        for near, far in ((x0, x0 + rail), (style.back - rail, x1 - 0.001)):
-            solid += box((near, far), y - 0.001, (top - board, top))
+        for deep in ((-x, -x + rail), (style.back - rail, x - 0.001)):
+            solid += box(deep, across, (top - board, top))
     else:
-        solid += box((x0, x1), y - 0.001, (top - board, top))
-        solid += _top(draws, kind, x0, x1, y, top)
+        solid += box(x, across, (top - board, top)) + _top(draws, kind, x, y, top)
     if kind not in ("base", "wall") and draws.chance("corner_posts", 0.15):  # down to the floor
         post = draws.length("post_width", (0.02, 0.045))
         to_floor = False
-        solid += union(box((near, min(s * y, s * (y + post)), 0), (near + post, max(s * y, s * (y + post)), top))
-                       for near in (x0 - fronts.GAP, x1 - post) for s in (-1, 1))  # fmt: skip
+        for near in (-x - fronts.GAP, x - post):
+            solid += union(box((near, near + post), (s * y, s * (y + post)), (0, top)) for s in (-1, 1))
     if to_floor:
-        setback = x0 + draws.length("plinth_setback", (0.02, 0.07))
-        return solid + box((setback, setback + board), y - 0.001, (0, stand + 0.001))
-    return solid + (_stand(draws, kind, x0, x1, y, stand, board, furniture) if stand > 0 else Solid())
+        setback = draws.length("plinth_setback", (0.02, 0.07)) - x
+        return solid + box((setback, setback + board), across, (0, stand + 0.001))
+    return solid + (_stand(draws, kind, x, y, stand, board, furniture) if stand > 0 else Solid())
 
 
-def _top(draws: Draws, kind: str, x0: float, x1: float, y: float, top: float) -> Solid:
-    if kind == "wall" or draws.chance("no_top", 0.25):
+def _top(draws: Draws, kind: str, x: float, y: float, top: float) -> Solid:
+    if kind == "wall" or draws.pick("top", {"none": 0.25, "board": 0.75}) == "none":
         return Solid()
-    over = draws.length("top_overhang", (0.0, 0.035))
-    thick = draws.length("top_thickness", (0.012, 0.04))
-    front = x0 - 0.022 - over
-    solid = box((front, x1), y + over, (top - 0.001, top + thick))
+    over, thick = draws.length("top_overhang", (0.0, 0.035)), draws.length("top_thickness", (0.012, 0.04))
+    front = -x - 0.022
+    solid = box((front - over, x), y + over, (top - 0.001, top + thick))
     if kind == "tall" and draws.chance("cornice", 0.4):
         for step in (1, 2):
             more, z = over + 0.012 * step, top + thick * step
-            solid += box((x0 - 0.022 - more, x1), y + more, (z - 0.001, z + thick))
+            solid += box((front - more, x), y + more, (z - 0.001, z + thick))
     if kind in ("dresser", "sideboard", "nightstand") and draws.chance("backboard", 0.12):
-        solid += box((x1 - 0.02, x1), y, (top, top + thick + draws.length("backboard_height", (0.05, 0.2))))
+        solid += box((x - 0.02, x), y, (top, top + thick + draws.length("backboard_height", (0.05, 0.2))))
     return solid
 
 
-def _stand(
-    draws: Draws, kind: str, x0: float, x1: float, y: float, height: float, board: float, furniture: Assembly
-) -> Solid:
-    """Plinth or legs below the body."""
+def _stand(draws: Draws, kind: str, x: float, y: float, height: float, board: float, furniture: Assembly) -> Solid:
+    """Plinth, brackets or legs below the body."""
     if kind == "base" or (height < 0.1 and draws.chance("plinth", 0.6)):
         setback = draws.length("plinth_setback", (0.03, 0.08) if kind == "base" else (-0.015, 0.03))
         wide = y - 0.5 * abs(setback) + 0.01
-        return frame((x0 + setback, -wide, 0), (x1, wide, height + 0.001), [board] * 4, 0, 1)
-    if height < 0.2 and draws.chance("brackets", 0.25):  # brackets: an angle at each corner
+        return frame((setback - x, -wide, 0), (x, wide, height + 0.001), [board] * 4, 0, 1)
+    signs = [(sx, sy) for sx in (-1, 1) for sy in (-1, 1)]
+    if height < 0.2 and draws.chance("brackets", 0.25):  # an angle at each corner
         arm, thick = draws.length("bracket_length", (0.06, 0.12)), draws.length("bracket_thickness", (0.018, 0.03))
-        ends = [(a, b, sx, sy) for sx, a in ((1, x0), (-1, x1)) for sy, b in ((1, -y), (-1, y))]
+        levels = ((1.0, height + 0.001), (0.6, 0.0))
         return union(
-            hull([(a + sx * u * p, b + sy * v * p, z) for p, z in ((1.0, height + 0.001), (0.6, 0.0))
-                  for u in (0.0, du) for v in (0.0, dv)])
-            for a, b, sx, sy in ends for du, dv in ((arm, thick), (thick, arm))
+            hull([(sx * (x - u * p), sy * (y - v * p), z) for p, z in levels for u in (0.0, du) for v in (0.0, dv)])
+            for sx, sy in signs for du, dv in ((arm, thick), (thick, arm))
         )  # fmt: skip
     furniture.record(legs=True)
-    radius = draws.length("leg_radius", (0.012, 0.03))
-    taper = draws.number("leg_taper", (0.45, 1.0))
+    radius, taper = draws.length("leg_radius", (0.012, 0.03)), draws.number("leg_taper", (0.45, 1.0))
     splay = draws.number("leg_splay", (0.0, 0.25)) * height
     splay *= draws.pick("legs_stand", ["upright", "splayed"]) == "splayed"
     inset = radius + draws.length("leg_inset", (0.0, 0.06))
     sections, legs = draws.pick("leg_sides", [4, 16]), Solid()
-    for sx, x in ((-1, x0 + inset), (1, x1 - inset)):
-        for sy in (-1, 1):
-            head = np.array([x, sy * (y - inset), height + 0.002])
-            foot = head + (0.8 * sx * splay, 0.8 * sy * splay, -height - 0.002)
-            legs += cylinder(foot, head, taper * radius, radius, sections)
+    inner_x, inner_y = x - inset, y - inset
+    for sx, sy in signs:
+        head = np.array([sx * inner_x, sy * inner_y, height + 0.002])
+        foot = head + (0.8 * sx * splay, 0.8 * sy * splay, -height - 0.002)
+        legs += cylinder(foot, head, taper * radius, radius, sections)
     if height > 0.12 and draws.chance("apron", 0.5):
-        drop = draws.length("apron_height", (0.02, 0.05))
-        legs += frame((x0 + inset - 0.008, -y + inset - 0.008, height - drop),
-                      (x1 - inset + 0.008, y - inset + 0.008, height + 0.001), [0.016] * 4, 0, 1)  # fmt: skip
+        low, high = height - draws.length("apron_height", (0.02, 0.05)), height + 0.001
+        inner_x, inner_y = inner_x + 0.008, inner_y + 0.008
+        legs += frame((-inner_x, -inner_y, low), (inner_x, inner_y, high), [0.016] * 4, 0, 1)
     return legs
