@@ -12,7 +12,7 @@ from artsim.families.details import bow_handle, knob, rounded_tray
 from artsim.families.proportions import unusual_sides
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import UP, about
+from artsim.making.outlines import UP, about, ends
 from artsim.making.solids import Solid, box, frame, hull, posts, rod, tray, union
 
 GAP = 0.0015
@@ -37,7 +37,6 @@ def _rigid(draws: Draws) -> Assembly:
     radius *= draws.pick("corners", ["square", "round"]) == "round"
     band = wall * draws.number("band_thickness", (0.3, 0.6))
     band *= draws.pick("edges", ["plain", "banded"]) == "banded"
-    back = x + band + 0.001
     seam = height + GAP
 
     body = _rigid_body(draws, x, y, height, wall, radius)
@@ -70,7 +69,7 @@ def _rigid(draws: Draws) -> Assembly:
         lid += bow_handle((0, -0.6 * size, top), (0, 0.6 * size, top), UP, 0.3 * size, 0.05 * size)
     chest.record(handles=side_handles or handle != "none")
     barrel = max(0.002, 0.25 * wall)
-    axis_x = back + barrel
+    axis_x = x + band + 0.001 + barrel
     if not domed and top - seam + 0.2 * min(x, y) < 0.7 * height and draws.chance("rear_board", 0.25):
         # A board below that stands out at the back, under the open lid, so that the box does not tip.
         behind = depth * draws.number("rear_board_reach", (0.015, 0.065))
@@ -99,18 +98,14 @@ def _bands(draws: Draws, x: float, y: float, low: float, high: float, band: floa
     """Boards and straps that stand out all around: at the edges, or across the front."""
     if band <= 0:
         return Solid()
-    inner = wall + radius
-    ends = [(low, low + 1.5 * wall), (high - 1.5 * wall, high)]
-    solid = union(
-        frame((-x - band, -y - band, z0), (x + band, y + band, z1), [0.8 * wall + band] * 4, 0, 1)
-        for z0, z1 in ends[: draws.integer("bands", 1, 2)]
-    )
+    solid = Solid()
+    for z0, z1 in ((low, low + 1.5 * wall), (high - 1.5 * wall, high))[: draws.integer("bands", 1, 2)]:
+        solid += frame((-x - band, -y - band, z0), (x + band, y + band, z1), [0.8 * wall + band] * 4, 0, 1)
     if draws.chance("strap", 0.6):
-        half = 0.7 * wall
         for share in {2: (-0.6, 0.6), 3: (-0.7, 0.0, 0.7)}[draws.pick("straps", [2, 3])]:
-            middle = share * (y - inner)
             for side in (-x - band, x - 0.8 * wall):
-                solid += box((side, side + band + 0.8 * wall), (middle - half, middle + half), (low, high))
+                across = about(share * (y - (wall + radius)), 0.7 * wall)
+                solid += box((side, side + band + 0.8 * wall), across, (low, high))
     return solid
 
 
@@ -136,8 +131,8 @@ def _feet(draws: Draws, x: float, y: float, wall: float) -> Solid:
         out = 0.0 if draws.chance("flush_plinth", 0.3) else 0.8 * wall
         return frame((-x - out, -y - out, -drop), (x, y + out, wall), [2 * wall + out] * 4, 0, 1)
     if kind == "blocks":
-        corners = [(s * (x - 2 * wall), t * (y - 2 * wall)) for s in (-1, 1) for t in (-1, 1)]
-        return union(box(about(a, 1.9 * wall), about(b, 1.9 * wall), (-drop, 0.5 * wall)) for a, b in corners)
+        corners = [(u, v) for u in ends(x - 2 * wall) for v in ends(y - 2 * wall)]
+        return union(box(about(u, 1.9 * wall), about(v, 1.9 * wall), (-drop, 0.5 * wall)) for u, v in corners)
     if kind == "balls":
         return posts(x - 2 * wall, y - 2 * wall, (-drop, 0.5 * wall), 1.2 * wall, 1.8 * wall, 16)
     return Solid()
@@ -156,12 +151,10 @@ def _lid(
         solid = box(low, high, fillet=radius, axis=2) if radius > 0 else box(low, high, fillet=0.2 * thick, steps=2)
         inner = 0.6 * over
         if plain and radius == 0.0 and inner > GAP and over - inner > 0.0015 and draws.chance("skirt", 0.6):
-            skirt = min(
-                draws.number("skirt_height", (0.5, 3.0)) * wall, 0.18 * height
-            )  # on three sides, outside the body
-            widths = [over - inner, 0.0, over - inner, over - inner]
+            skirt = min(draws.number("skirt_height", (0.5, 3.0)) * wall, 0.18 * height)
+            widths = [over - inner, 0.0, over - inner, over - inner]  # on three sides, outside the body
             solid += frame((-x - over, -y - over, seam - skirt), (x, y + over, seam + 0.6 * thick), widths, 0, 1)
-        elif draws.chance("raised_board", 0.4):  # a raised board on top
+        elif draws.chance("raised_board", 0.4):
             solid += box(0.75 * x, 0.85 * y, (seam + 0.5 * thick, seam + 1.4 * thick), fillet=0.3 * thick)
         return solid, seam + thick, False
     if kind == "hollow":
@@ -190,13 +183,10 @@ def _lid(
 
 def _latches(draws: Draws, chest: Assembly, front: float, y: float, seam: float, top: float) -> None:
     """Hasps on the lid's front that hang down over the body and flip up."""
-    width = min(0.08 * y, 0.02)
-    upper = min(0.4 * (top - seam), 0.1 * y, 0.025)
-    pin = 0.0025
+    width, upper, pin = min(0.08 * y, 0.02), min(0.4 * (top - seam), 0.1 * y, 0.025), 0.0025
+    axis_x, z = -front - 2.2 * pin, seam + upper
     for number, share in enumerate({1: (0.0,), 2: (-0.6, 0.6)}[draws.pick("latches", {1: 0.5, 2: 0.5})]):
         middle = share * y
-        axis_x = -front - 2.2 * pin
-        z = seam + upper
         solid = rod(axis_x, (middle - width, middle + width), z, pin, sections=12)
         solid += box((axis_x - 0.002, axis_x + 0.001), about(middle, width), (seam - 1.4 * upper, z), fillet=0.001)
         turn = revolute("lid", (0, 1, 0), (axis_x, middle, z), 0.0, np.deg2rad(85.0))

@@ -8,9 +8,9 @@ flaps reach and turn, and hand holes vary.
 import numpy as np
 
 from artsim.families.proportions import unusual_sides
-from artsim.making.assembly import Assembly, JointSpec, revolute
+from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
-from artsim.making.solids import Solid, box, frame, hull, tray
+from artsim.making.solids import Solid, box, deferred, frame, hull, tray
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
@@ -27,20 +27,31 @@ def carton(draws: Draws) -> Assembly:
         depth, width, height = unusual_sides(draws, LEAST_SHARES, MOST_SHARES, (0.14, 0.18, 0.06))
     wall = draws.length("wall", (0.003, 0.005))
     x, y = depth / 2, width / 2
-    result = Assembly(density=150.0)
-    result.add("body", _carton_body(draws, x, y, height, wall))
+    result = Assembly("body", _carton_body(draws, x, y, height, wall), 150.0)
     kinds = {"one": 0.12, "two": 0.25, "mitred": 0.14, "long": 0.16, "short": 0.11, "wheel": 0.1, "inner": 0.12}
     kind = draws.pick("flap_pattern", kinds)
     flaps = _flaps(draws, kind, x, y, wall, height)
     limit = np.deg2rad(_limit(draws, 100.0))
     for number, (side, inward, outline) in enumerate(flaps):
-        z = height + GAP + (0.0007 if side in ("left", "right") else 0.0)
-        if inward:
-            result.add(f"flap_{number}", *_inner_flap(side, outline, x, y, height, wall))
-            continue
-        own_limit = limit if draws.chance("flaps_alike", 0.7) else np.deg2rad(_limit(draws, 95.0))
-        lip = draws.length("lip", (0.03, 0.08)) if kind == "one" and draws.chance("lipped", 0.5) else 0.0
-        solid, joint = _outer_flap(side, outline, x, y, z, wall, own_limit, min(lip, 0.6 * height))
+        across, sign, axis = _SIDES[side]
+        edge = (x, y)[across]
+        origin = np.zeros(3)
+        if inward:  # below the others, within the walls: it folds down into the carton
+            edge = edge - wall - GAP
+            solid = _flap(side, outline, edge, height - wall, height)
+            origin[across], origin[2] = sign * edge, height - wall
+            joint = revolute("body", -np.asarray(axis), origin, 0.0, np.deg2rad(86.0))
+        else:  # it lies on the walls, and turns about its upper edge, so that it may hang down outside
+            own_limit = limit if draws.chance("flaps_alike", 0.7) else np.deg2rad(_limit(draws, 95.0))
+            z = height + GAP + (0.0007 if side in ("left", "right") else 0.0)
+            solid = _flap(side, outline, edge, z, z + wall)
+            if kind == "one" and draws.chance("lipped", 0.5):  # over the front
+                lip = min(draws.length("lip", (0.03, 0.08)), 0.6 * height)
+                solid += box((-x - GAP - wall, -x - GAP), y, (z - lip, z + wall))
+                solid += box((-x - GAP - wall, 0), y, (z, z + wall))
+            # The axis lies beyond the wall, which a flap turned by 270 degrees hangs beside.
+            origin[across], origin[2] = sign * (edge + GAP), z + wall
+            joint = revolute("body", axis, origin, 0.0, own_limit)
         result.add(f"flap_{number}", solid, joint)
     return result
 
@@ -51,8 +62,7 @@ def _limit(draws: Draws, least: float) -> float:
 
 
 def _carton_body(draws: Draws, x: float, y: float, height: float, wall: float) -> Solid:
-    holes = draws.chance("hand_holes", 0.35) and min(x, y) > 0.1 and height > 0.15
-    if not holes:
+    if not (draws.chance("hand_holes", 0.35) and min(x, y) > 0.1 and height > 0.15):
         return tray((-x, -y, 0), (x, y, height), wall)
     solid = box(x, y, (0, wall))
     solid += box((-x, -x + wall), y, (0, height)) + box((x - wall, x), y, (0, height))
@@ -115,15 +125,12 @@ def _flaps(draws: Draws, kind: str, x: float, y: float, wall: float, height: flo
 
 
 # Of each side: the axis across the hinge (0: X, 1: Y), its sign at that side, and the direction of the hinge.
-_SIDES = {
-    "front": (0, -1.0, (0.0, -1.0, 0.0)),
-    "back": (0, 1.0, (0.0, 1.0, 0.0)),
-    "left": (1, 1.0, (-1.0, 0.0, 0.0)),
-    "right": (1, -1.0, (1.0, 0.0, 0.0)),
-}
+_SIDES = {"front": (0, -1.0, (0.0, -1.0, 0.0)), "back": (0, 1.0, (0.0, 1.0, 0.0)),
+          "left": (1, 1.0, (-1.0, 0.0, 0.0)), "right": (1, -1.0, (1.0, 0.0, 0.0))}  # fmt: skip
 
 
-def _prism(side: str, outline: Array, edge: float, low: float, high: float) -> Solid:
+@deferred
+def _flap(side: str, outline: Array, edge: float, low: float, high: float) -> Solid:
     """Flat piece between two heights from an outline along a hinge at distance ``edge`` from the middle."""
     across, sign, _ = _SIDES[side]
     points = np.empty((2, len(outline), 3))
@@ -131,27 +138,3 @@ def _prism(side: str, outline: Array, edge: float, low: float, high: float) -> S
     points[:, :, 1 - across] = outline[:, 1]
     points[0, :, 2], points[1, :, 2] = low, high
     return hull(points.reshape(-1, 3))
-
-
-def _outer_flap(
-    side: str, outline: Array, x: float, y: float, z: float, wall: float, limit: float, lip: float
-) -> tuple[Solid, JointSpec]:
-    """A flap that lies on the walls and opens outward about its upper edge, so that it may hang down outside."""
-    across, sign, axis = _SIDES[side]
-    edge = (x, y)[across]
-    solid = _prism(side, outline, edge, z, z + wall)
-    if lip > 0:  # over the front
-        solid += box((-x - GAP - wall, -x - GAP), y, (z - lip, z + wall)) + box((-x - GAP - wall, 0), y, (z, z + wall))
-    origin = np.array([0.0, 0.0, z + wall])
-    origin[across] = sign * (edge + GAP)  # beyond the wall, which a flap turned by 270 degrees hangs beside
-    return solid, revolute("body", axis, tuple(origin), 0.0, limit)
-
-
-def _inner_flap(side: str, outline: Array, x: float, y: float, height: float, wall: float) -> tuple[Solid, JointSpec]:
-    """A flap below the others, within the walls, that folds down into the carton."""
-    across, sign, axis = _SIDES[side]
-    edge = (x, y)[across] - wall - GAP
-    solid = _prism(side, outline, edge, height - wall, height)
-    origin = np.array([0.0, 0.0, height - wall])
-    origin[across] = sign * edge
-    return solid, revolute("body", -np.asarray(axis), tuple(origin), 0.0, np.deg2rad(86.0))

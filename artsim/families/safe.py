@@ -78,12 +78,11 @@ def build(draws: Draws) -> Assembly:
     along = low[1] + (0.5 if kind == "tall" or draws.chance("lock_centred", 0.4) else 0.35) * (high[1] - low[1])
     upright = high[2] - low[2] > 0.85 * (high[1] - low[1])
     # The lock above the handle, or beside it on a low door.
-    spots = (
-        [(along, low[2] + s * (high[2] - low[2])) for s in (0.66, 0.4)]
-        if upright
-        else [(low[1] + s * (high[1] - low[1]), 0.5 * (low[2] + high[2])) for s in (0.66, 0.33)]
-    )
-    (lock_y, lock_z), (grip_y, grip_z) = spots
+    if upright:
+        (lock_y, lock_z), (grip_y, grip_z) = ((along, low[2] + s * (high[2] - low[2])) for s in (0.66, 0.4))
+    else:
+        level = 0.5 * (low[2] + high[2])
+        (lock_y, lock_z), (grip_y, grip_z) = ((low[1] + s * (high[1] - low[1]), level) for s in (0.66, 0.33))
     apart = float(hypot(lock_y - grip_y, lock_z - grip_z))
     if combination:
         radius = min(0.13 * size, 0.055, 0.3 * apart)
