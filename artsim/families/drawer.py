@@ -169,9 +169,7 @@ def _table(draws: Draws, furniture: _Furniture) -> None:
     inset = draws.number("apron_inset", (0.0, 0.4)) * leg
     share = 1.0 if draws.chance("whole_apron", 0.6) else draws.number("case_width", (0.4, 0.9))
     span = max(between * share, _NARROWEST / 2)
-    middle = 0.0
-    if not draws.chance("centred", 0.8):
-        middle = between - span if draws.pick("aside", ["right", "left"]) == "left" else span - between
+    middle = 0.0 if draws.chance("centred", 0.8) else draws.side("case_side") * (between - span)
     columns = int(np.clip(round(2 * span / draws.length("column_width", (0.25, 0.7))), 1, 4))
     sides = draws.pick("open_sides", {"front": 0.82, "back": 0.08, "both": 0.1})
     deepest = depth - 2 * over - 2 * inset - wall
