@@ -30,8 +30,9 @@ class Shape:
         self.wall = self.half * draws.number("wall", (0.08, 0.26))
         self.low = draws.length("foot_height", (0.008, 0.06)) if draws.chance("feet", 0.65) else 0.0
         self.high = self.low + height
-        self.depth = self.half * draws.number("depth", (1.4, 2.3))
-        self.thick = self.half * draws.number("door_thickness", (0.06, 0.3))  # of the door
+        self.depth = self.half * draws.number("depth", (1.4, 2.3), (1.4, 3.0), tails=0.15)
+        widest = None if self.inset else (0.06, 1.2)  # a few doors before the walls hold the lock's works, or a chest
+        self.thick = self.half * draws.number("door_thickness", (0.06, 0.3), widest, tails=0.3)
         self.barrel = 0.0  # radius of the barrels on the hinge axis; 0 for a hidden hinge
         if self.inset and draws.chance("barrels", 0.6):
             self.barrel = float(np.clip(0.3 * self.wall, 0.006, 0.014))
@@ -65,7 +66,10 @@ def build(draws: Draws) -> Assembly:
     safe = Assembly("body", placed(_body(draws, shape)), 2500.0)
     safe.record(handles=True)
     x, y = shape.hinge
-    upper = np.deg2rad(draws.degrees("door_angle", (100.0, 176.0)))
+    # Right back, a door within the walls on a hidden hinge would press its raised board on them.
+    free = not shape.inset or shape.barrel > 0
+    right_back = free and draws.chance("opens_right_back", 0.15)
+    upper = np.pi if right_back else np.deg2rad(draws.degrees("door_angle", (100.0, 176.0)))
     face = shape.door[0][0]
     front = face - 0.0045  # clear of a raised board
     opener = draws.pick("opener", {"lever": 0.45, "wheel": 0.3, "pull": 0.25})
