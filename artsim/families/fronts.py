@@ -72,6 +72,7 @@ class Style:
     lap: float  # how far overlaid fronts reach over the boards; they meet over a board that is narrower
     place: float  # where the handles of doors are, as a share of the doors' height
     level: bool  # handles of doors lie level rather than upright
+    free_flaps: bool = False  # nothing stands out above or below the body: flaps there open beyond a right angle
 
 
 def drawer(draws: Draws, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:
@@ -229,12 +230,13 @@ def _leaf(draws: Draws, cell: Cell, style: Style, hinge: str, low: Array, high: 
     place = style.place if across == 1 else 0.5
     grip[along] = np.clip(low[along] + place * length, low[along] + margin, high[along] - margin)
     handle = _handle(style, grip, run, half, low, high)
-    outer = (cell.outer_high if end > 0 else cell.outer_low)[across - 1] and across == 1
+    outer = (cell.outer_high if end > 0 else cell.outer_low)[across - 1] and (across == 1 or style.free_flaps)
     bounds = handle.bounds() if handle.pieces else np.array([grip, grip])
     near = edge - bounds[1, across] if end > 0 else bounds[0, across] - edge
     limit, most = swing_limits(near, low[0] - bounds[0, 0])
     if outer:
-        limit = min(most, np.deg2rad(draws.pick("door_angle", [95.0, 110.0, 135.0, 170.0])))
+        angles = [95.0, 110.0, 135.0, 170.0] if across == 1 else [95.0, 105.0, 115.0]
+        limit = min(most, np.deg2rad(draws.pick("door_angle", angles)))
     origin = 0.5 * (low + high)
     origin[across], origin[0] = edge, low[0] - 0.0005
     return "door", solid + handle, revolute("body", axis, tuple(origin), 0.0, float(limit))

@@ -75,7 +75,8 @@ def _style(draws: Draws, kind: str, depth: float) -> Style:
         handle_length=draws.length("handle_length", (0.08, 0.35) if draws.chance("short_bars", 0.8) else (0.35, 0.8)),
         reach=draws.length("handle_reach", (0.018, 0.04)),
         grip=draws.length("handle_radius", (0.004, 0.008)),
-        travel=draws.number("travel", (0.5, 0.88)),
+        free_flaps=kind == "wall",
+        travel=draws.number("travel", (0.5, 0.97)),
     )
 
 
