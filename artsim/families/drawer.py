@@ -11,11 +11,11 @@ import numpy as np
 
 from artsim.families.details import front_handle, knob, panel
 from artsim.families.proportions import unusual_sides
-from artsim.families.table_parts import PEDESTALS, levels
+from artsim.families.table_parts import PEDESTALS, four_legs, levels
 from artsim.making.assembly import Assembly, prismatic
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, Vector, about
-from artsim.making.solids import Solid, box, frame, hull_of, rod, tray, tube, union
+from artsim.making.outlines import FRONT, Vector
+from artsim.making.solids import Solid, box, frame, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
@@ -24,6 +24,7 @@ _NARROWEST, _SHALLOWEST = 0.12, 0.1  # of what is between a table's legs, and of
 
 _LEAST_SHARES, _MOST_SHARES = (0.148, 0.28, 0.11), (0.84, 0.983, 0.935)
 """Depth, width and height of unusual furniture over its diagonal."""
+_LEGS = {"square": 0.35, "blocked": 0.25, "round": 0.25, "baluster": 0.15}, 0.45
 
 
 class _Furniture(Assembly):
@@ -143,7 +144,7 @@ def _chest(draws: Draws, furniture: _Furniture) -> None:
         thick = draws.length("top_thickness", (0.01, 0.035))
         furniture.body += box((-x - front, x), y + over, (top - 0.001, top + thick), fillet=0.3 * thick)
     if raised:
-        furniture.body += _legs(draws, x, y, legs + 0.001, draws.length("leg_width", (0.02, 0.06)))
+        furniture.body += four_legs(draws, x, y, 0.0, legs + 0.001, draws.length("leg_width", (0.02, 0.06)), *_LEGS)
         furniture.record(legs=True)
     elif legs > 0.005:
         recess = draws.length("plinth_setback", (0.0, 0.05))
@@ -163,7 +164,7 @@ def _table(draws: Draws, furniture: _Furniture) -> None:
     x, y, top = depth / 2 - over, width / 2 - over, height - thick
     apron = max(height * draws.number("apron_height", (0.11, 0.25)), 0.075)
     wall = draws.length("board", (0.012, 0.02))
-    furniture.body += _top(draws, depth, width, top, height) + _legs(draws, x, y, top + 0.001, leg)
+    furniture.body += _top(draws, depth, width, top, height) + four_legs(draws, x, y, 0.0, top + 0.001, leg, *_LEGS)
     furniture.record(legs=True)
     between = y - leg + 0.002  # the apron reaches into the legs
     inset = draws.number("apron_inset", (0.0, 0.4)) * leg
@@ -238,7 +239,7 @@ def _desk(draws: Draws, furniture: _Furniture) -> None:
     right = outer - (pedestal if 1 in sides else wall) + 0.002
     if on_legs:
         furniture.record(legs=True)
-        furniture.body += _legs(draws, x, y, top + 0.001, leg)
+        furniture.body += four_legs(draws, x, y, 0.0, top + 0.001, leg, *_LEGS)
     elif len(sides) == 1:  # a panel holds the other end
         edge = -sides[0] * y
         furniture.body += box(x, (edge, edge + sides[0] * wall), (0, top))
@@ -277,26 +278,3 @@ def _top(draws: Draws, depth: float, width: float, low: float, high: float) -> S
     if draws.chance("round_corners", 0.2):
         return box(*corners, fillet=draws.length("corner_radius", (0.02, 0.1)), axis=2)
     return box(*corners, fillet=radius)
-
-
-def _legs(draws: Draws, x: float, y: float, height: float, size: float) -> Solid:
-    """Four legs with their outer edges on a rectangle: square or round, straight, tapered or turned."""
-    kind = draws.pick("leg_shape", {"square": 0.35, "tapered": 0.25, "round": 0.25, "turned": 0.15})
-    taper = draws.number("leg_taper", (0.45, 0.9))
-    half, solid = size / 2, Solid()
-    for u in (half - x, x - half):
-        for v in (half - y, y - half):
-            beside = about(u, half), about(v, half)
-            if kind == "square":
-                solid += box(*beside, (0, height))
-            elif kind == "round":
-                solid += rod(u, v, (0, height), half * taper, half, 16)
-            elif kind == "tapered":  # below a straight block, its outer faces upright
-                block, foot = box(*beside, (0.75 * height, height)), taper * half
-                corner = (u + np.sign(u) * (half - foot), v + np.sign(v) * (half - foot), 0.0)
-                solid += block + hull_of(block, box(foot, foot, (0, 0.01)).moved(corner))
-            else:
-                radii = half * np.array([0.5, 0.8, 0.5, 0.95, 0.6, 0.9, 0.6, 1.0])
-                path = [(u, v, share * height) for share in (0.0, 0.03, 0.1, 0.45, 0.5, 0.53, 0.56, 0.7)]
-                solid += tube(path, radii.tolist(), 12) + box(*beside, (0.69 * height, height))
-    return solid

@@ -147,7 +147,7 @@ def _pedestals(draws: Draws, table: Assembly) -> None:
             spots = [(u, v) for u in (front + 0.05, front + deep - overhang - 0.05) for v in (a + 0.05, b - 0.05)]
             wheels(table, spots, low_z, 0.05)
     if on_legs:
-        table.body += four_legs(draws, x, y, 0.0, top + 0.001, size, splay=False)
+        table.body += four_legs(draws, x, y, 0.0, top + 0.001, size)
     elif len(sides) == 1:
         panel = draws.length("end_panel", (0.02, 0.05))
         table.body += box((-x + overhang, x), (-sides[0] * y, -sides[0] * (y - panel)), (0.0, top + 0.001))

@@ -1,5 +1,6 @@
 """Pieces of tables: tops, legs, cases with drawers and doors, leaves, trays, wheels."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from artsim.making.solids import Solid, box, cylinder, hull_of, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.003
+LEGS = {"square": 0.3, "tapered": 0.22, "round": 0.22, "turned": 0.13, "loops": 0.13}
 PEDESTALS = {"right": (-1,), "left": (1,), "both": (-1, 1)}
 """Sides of a desk, along Y, that have a pedestal."""
 
@@ -106,10 +108,13 @@ def table_top(draws: Draws, depth: float, width: float, low: float, high: float)
     return box(*corners, fillet=draws.pick("edge_rounding", [0.1, 0.3, 0.49]) * (high - low))
 
 
-def four_legs(draws: Draws, x: float, y: float, low: float, high: float, size: float, splay: bool) -> Solid:
-    """Four legs within a rectangle: square, tapered, round, turned or a loop at either end."""
-    kind = draws.pick("leg_shape", {"square": 0.3, "tapered": 0.22, "round": 0.22, "turned": 0.13, "loops": 0.13})
-    half, taper, tall = size / 2, draws.number("leg_taper", (0.4, 0.9)), high - low
+def four_legs(
+    draws: Draws, x: float, y: float, low: float, high: float, size: float, shapes: Mapping[str, float] = LEGS,
+    thinnest: float = 0.4, splay: bool = False,
+) -> Solid:  # fmt: skip
+    """Four legs with their outer edges on a rectangle, of one of several shapes, or a loop at either end."""
+    kind = draws.pick("leg_shape", shapes)
+    half, taper, tall = size / 2, draws.number("leg_taper", (thinnest, 0.9)), high - low
     out = min(0.12 * tall, 0.2 * min(x, y)) if splay and kind in ("tapered", "round") else 0.0
     solid = Solid()
     for sx in (-1, 1):
@@ -127,6 +132,15 @@ def four_legs(draws: Draws, x: float, y: float, low: float, high: float, size: f
                 solid += cylinder(foot, head, taper * half, half, 16)
             elif kind == "tapered" and out:
                 solid += cylinder(foot, head, taper * half, 1.2 * half, 4)
+            elif kind == "blocked":  # tapered below a straight block, its outer faces upright
+                block, thin = box(head - (half, half, 0.25 * tall), head + (half, half, 0)), taper * half
+                corner = foot + (sx * (half - thin), sy * (half - thin), 0)
+                solid += block + hull_of(block, box(thin, thin, (0, 0.01)).moved(corner))
+            elif kind == "baluster":  # turned below a straight block
+                path = [(*head[:2], share * high) for share in (0.0, 0.03, 0.1, 0.45, 0.5, 0.53, 0.56, 0.7)]
+                radii = half * np.array([0.5, 0.8, 0.5, 0.95, 0.6, 0.9, 0.6, 1.0])
+                solid += tube(path, radii.tolist(), 12)
+                solid += box(about(head[0], half), about(head[1], half), (0.69 * high, high))
             elif kind == "tapered":
                 below = box(foot - (taper * half, taper * half, 0), foot + (taper * half, taper * half, 0.01))
                 solid += hull_of(below, box(head - (half, half, 0.25 * tall), head + (half, half, 0)))
