@@ -1,8 +1,4 @@
-"""Draws with tails: most objects of a family are usual, and a few lie far from the middle.
-
-A flat draw over all that a category holds makes most objects odd. So the usual range is drawn most often, and its
-tails seldom.
-"""
+"""Proportions far from the middle, which few objects of a family have: a flat draw would make most objects odd."""
 
 from collections.abc import Sequence
 
