@@ -108,22 +108,27 @@ class Draws:
         return self._trace.drawn
 
     def number(
-        self, name: str, usual: Interval, widest: Interval | None = None, *, tails: float = 0.25, unit: str = ""
-    ) -> float:
+        self, name: str, usual: Interval, widest: Interval | None = None, *, tails: float = 0.25, unit: str = "",
+        of: float = 1.0,
+    ) -> float:  # fmt: skip
         """A number from the usual range, or with chance ``tails`` from what the widest range has beyond it.
 
-        A flat draw over all that a category holds makes most objects odd: tails are drawn seldom.
+        A flat draw over all that a category holds makes most objects odd: tails are drawn seldom. The ranges are shares
+        ``of`` a number.
         """
         low, high = usual
         if widest is not None:
             beyond = [t for t in ((widest[0], low), (high, widest[1])) if t[0] < t[1]]
             if beyond and self._rng.random() < tails:
                 low, high = beyond[int(self._rng.integers(len(beyond)))]
-        return self._number(name, float(self._rng.uniform(low, high)), widest or usual, unit)
+        least, most = widest or usual
+        return self._number(name, of * float(self._rng.uniform(low, high)), (of * least, of * most), unit)
 
-    def length(self, name: str, usual: Interval, widest: Interval | None = None, *, tails: float = 0.25) -> float:
-        """A :meth:`number` of metres."""
-        return self.number(name, usual, widest, tails=tails, unit="m")
+    def length(
+        self, name: str, usual: Interval, widest: Interval | None = None, *, tails: float = 0.25, of: float = 1.0
+    ) -> float:
+        """A :meth:`number` of metres; or a share ``of`` a length, which is kept in metres."""
+        return self.number(name, usual, widest, tails=tails, unit="m", of=of)
 
     def angle(self, name: str, usual: Interval, widest: Interval | None = None, *, tails: float = 0.25) -> float:
         """A :meth:`number` of radians."""
