@@ -54,7 +54,7 @@ def build(draws: Draws) -> Assembly:
     half_door = draws.chance("half_door", 0.12) and not compact  # there is no room for it
     narrow = draws.chance("narrow", 0.2) and not compact
     width = draws.length("width", (0.42, 0.48) if narrow else (0.54, 0.64))
-    height = width * draws.number("height_share", (0.75, 0.95)) if compact else draws.length("height", (0.70, 0.9))
+    height = draws.length("height", (0.75, 0.95), of=width) if compact else draws.length("height", (0.70, 0.9))
     wall, thick = draws.length("wall", (0.012, 0.04)), draws.length("door_thickness", (0.03, 0.075))
     low = compact or draws.chance("plinth_low", 0.4)
     plinth = draws.length("plinth_height", (0.02, 0.05) if low else (0.06, 0.15))

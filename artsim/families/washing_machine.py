@@ -126,7 +126,7 @@ def _porthole(draws: Draws, z: float, hole: float, outer: float, thick: float, b
     """Door with its hinge at +Y; the glass reaches into the hole."""
     x0, x1 = -GAP - thick, -GAP
     glass = hole * draws.number("glass_radius", (0.72, 0.9))
-    closed = draws.chance("door_closed", 0.15)
+    blind = draws.chance("door_blind", 0.15)
     if draws.pick("door_shape", {"round": 0.75, "square": 0.25}) == "round":
         solid = ring((0.5 * (x0 + x1), 0, z), (1, 0, 0), 0.97 * glass, outer, thick, 22)
         if draws.chance("door_bead", 0.5):
@@ -135,7 +135,7 @@ def _porthole(draws: Draws, z: float, hole: float, outer: float, thick: float, b
         solid = holed_plate((x0, -outer, z - outer), (x1, outer, z + outer), (0.0, z), 0.97 * glass, 0, 20)
     # The bowl is narrow enough to swing past the rim of the hole.
     pane = rod((x1 - 0.002, x1 + bowl), 0, z, hole - 0.008, 0.78 * hole, 28)
-    if closed:
+    if blind:
         solid += rod((x0 - 0.004, x1), 0, z, glass, sections=28) + pane
     else:
         solid += (rod((x0 + 0.3 * thick, x1 + 0.002), 0, z, glass * 1.02, sections=28) + pane).called("glass", FRONT)
