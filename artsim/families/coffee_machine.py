@@ -9,7 +9,7 @@ vary.
 import numpy as np
 
 from artsim.common.elementary import power
-from artsim.families.details import dial, drawn_side
+from artsim.families.details import dial
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, UP, about, lifted, rounded_rectangle
@@ -61,7 +61,7 @@ def _espresso(draws: Draws) -> Assembly:
         body += tube([(a, b, height + post) for a, b in corners], 0.0035, 8, closed=True)
         body += union(rod(a, b, (height - 0.003, height + post), 0.003, sections=8) for a, b in corners)
 
-    wand_side = drawn_side(draws, "wand_side") if draws.chance("steam_wand", 0.7) and y > 0.11 else 0.0
+    wand_side = draws.side("wand_side") if draws.chance("steam_wand", 0.7) and y > 0.11 else 0.0
     group = np.array([-x + 0.5 * front, -0.25 * wand_side * y, head_low])
     body += cylinder(group + (0, 0, 0.002), group - (0, 0, 0.014), 0.036, sections=24)
     machine = Assembly("body", body, 900.0)
@@ -80,7 +80,7 @@ def _espresso(draws: Draws) -> Assembly:
             cylinder((group_x, group_y + s * 0.012, top - 0.045), (group_x, group_y, top - 0.028), 0.005, 0.007, 10)
             for s in (-1, 1)
         )
-    away = -wand_side if wand_side else drawn_side(draws, "portafilter_side")
+    away = -wand_side if wand_side else draws.side("portafilter_side")
     limit = np.deg2rad(draws.degrees("portafilter_angle", (35.0, 55.0)))
     machine.add("portafilter", basket, revolute("body", (0, 0, -away), group, 0.0, limit), density=3000.0)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.common.elementary import hypot
-from artsim.families.details import dial, drawn_side, flat_handle, front_handle, push_button, wire_shelf
+from artsim.families.details import dial, flat_handle, front_handle, push_button, wire_shelf
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, UP, about
@@ -263,7 +263,7 @@ def _marks(draws: Draws, x: float, half: float, z: float) -> Solid:
     solid = Solid()
     if draws.chance("display", 0.6):
         solid += box((x - 0.0015, x + 0.002), 0.2 * half, (z - 0.015, z + 0.015)).called("display", FRONT)
-    for y in np.linspace(0.4, 0.8, draws.integer("key_count", 2, 5)) * half * drawn_side(draws, "key_side"):
+    for y in np.linspace(0.4, 0.8, draws.integer("key_count", 2, 5)) * half * draws.side("key_side"):
         key = box((x - 0.002, x + 0.002), (y - 0.01, y + 0.01), (z - 0.007, z + 0.007), fillet=0.004, axis=0)
         solid += key.called("button", FRONT)
     return solid

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.common.elementary import arctan2
-from artsim.families.details import dial, drawn_side, front_handle, push_button, side_hinge, windowed_panel, wire_shelf
+from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel, wire_shelf
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
 from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, UP, Vector, about
@@ -94,7 +94,7 @@ def _cooktop(draws: Draws) -> Assembly:
     depth, height = draws.length("depth", (0.28, 0.56)), draws.length("height", (0.02, 0.12))
     strip = draws.length("strip_width", (0.06, 0.1))  # for the dials
     beside = draws.chance("knobs_beside", 0.6)
-    side = drawn_side(draws, "knob_side")
+    side = draws.side("knob_side")
     front = 0.004
     body = _hob(draws, half, depth, height, front, 0.008) + box((-front, depth), half, (0, height), fillet=0.008)
     level = height + 0.008

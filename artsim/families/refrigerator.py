@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from artsim.families.details import drawn_side, front_handle, rounded_shell, side_hinge
+from artsim.families.details import front_handle, rounded_shell, side_hinge
 from artsim.making.assembly import Assembly, prismatic
 from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, about
@@ -49,7 +49,7 @@ def build(draws: Draws) -> Assembly:
     half, depth = 0.5 * width, draws.length("depth", (0.45, 0.6) if small else (0.5, 0.72))
     foot = draws.length("foot_height", (0.015, 0.1))
     style = Style(draws)
-    top, side = foot + tall, drawn_side(draws, "hinge_side")
+    top, side = foot + tall, draws.side("hinge_side")
     fronts: list[Front] = []
     if layout == "single":
         fronts.append((side, -half, half, foot, top))

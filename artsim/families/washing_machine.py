@@ -8,7 +8,7 @@ feet, plinth, worktop.
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.families.details import dial, drawn_side, front_handle, holed_plate, push_button, side_hinge
+from artsim.families.details import dial, front_handle, holed_plate, push_button, side_hinge
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, UP, about
@@ -54,7 +54,7 @@ def _front_loader(draws: Draws, s: Shape) -> Assembly:
     z = s.low + (strip - s.low) * draws.number("hole_height", (0.5, 0.56))
     drum = min(s.half - 0.03, strip - z - 0.015, hole + 0.09)
     plate = 0.02
-    box_half, box_side = 0.5 * draws.length("drawer_width", (0.14, 0.24)), drawn_side(draws, "drawer_side")
+    box_half, box_side = 0.5 * draws.length("drawer_width", (0.14, 0.24)), draws.side("drawer_side")
     drawer = draws.chance("detergent_drawer", 0.75)
 
     body = tray((0.5 * plate, -s.half, s.low), (s.depth, s.half, s.high), 0.012, axis=0, side=-1) + _feet(s)
@@ -194,7 +194,7 @@ def _top_loader(draws: Draws, s: Shape) -> Assembly:
         machine.add("lid", lid, revolute("body", (0, 1, 0), (high[0], 0, high[2]), 0.0, upper))
     else:
         upper = np.deg2rad(draws.degrees("lid_angle", (85.0, 120.0), (40.0, 120.0), tails=0.3))
-        side = drawn_side(draws, "lid_hinge_side")
+        side = draws.side("lid_hinge_side")
         x, free = 0.5 * (low[0] + high[0]), -side * high[1]
         lid += box(about(x, 0.06), about(free, 0.01), grip, fillet=0.004).called("handle", (0, -side, 0))
         machine.add("lid", lid, revolute("body", (-side, 0, 0), (x, side * high[1], high[2]), 0.0, upper))
