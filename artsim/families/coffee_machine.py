@@ -1,9 +1,7 @@
 """Coffee machines: espresso machines with a portafilter, drip machines with a carafe, pod machines with a lever,
 percolators whose lid lifts off, and urns.
 
-Drip trays slide out; portafilters, levers, lids and steam wands turn; lids of drip machines lift off, too; knobs turn
-freely; buttons travel; carafes and water tanks come out. Sizes, round or square bodies, and which of these there are
-vary.
+What varies: sizes, round or square bodies; which of drip tray, steam wand, lid, knobs, buttons, carafe, tank move.
 """
 
 import numpy as np
@@ -25,8 +23,9 @@ def build(draws: Draws) -> Assembly:
     return kinds[kind](draws)
 
 
-def _drip_tray(draws: Draws, machine: Assembly, x0: float, depth: float, y: float, low: float, high: float) -> None:
-    """A tray with a slotted cover, in an opening of the base between two heights."""
+def _drip_tray(draws: Draws, machine: Assembly, x: float, front: float, y: float, high: float) -> None:
+    """A tray with a slotted cover, in the niche of the base."""
+    x0, depth, low = -x - 0.001, front - 0.003, 0.01
     solid = tray((x0, -y, low), (x0 + depth, y, high), 0.003)
     count = draws.integer("tray_bars", 2, 5) + 1
     for edge in np.linspace(-y, y, count + 1)[1:-1]:
@@ -65,7 +64,7 @@ def _espresso(draws: Draws) -> Assembly:
     group = np.array([-x + 0.5 * front, -0.25 * wand_side * y, head_low])
     body += cylinder(group + (0, 0, 0.002), group - (0, 0, 0.014), 0.036, sections=24)
     machine = Assembly("body", body, 900.0)
-    _drip_tray(draws, machine, -x - 0.001, front - 0.003, tray_y, 0.01, base)
+    _drip_tray(draws, machine, x, front, tray_y, base)
 
     # The portafilter turns away from the wand.
     group_x, group_y, top = group[0], group[1], group[2] - 0.014 - GAP
@@ -248,7 +247,7 @@ def _pod(draws: Draws) -> Assembly:
     body += box((-x + 0.01, tank_x - 0.001), y, (height - head, height), fillet=1.5 * radius, axis=1)
     body += rod(-x + 0.5 * front, 0, (height - head - 0.018, height - head + 0.002), 0.012, 0.02, 16)
     machine = Assembly("body", body, 700.0)
-    _drip_tray(draws, machine, -x - 0.001, front - 0.003, y - 0.01, 0.01, base)
+    _drip_tray(draws, machine, x, front, y - 0.01, base)
     # The lever lies on the head and turns up about an axis above its back.
     pivot, axle, wide = tank_x - 0.04, height + 0.0075, 0.7 * y
     tip = pivot - draws.number("lever_length", (0.6, 0.95)) * (pivot + x - 0.01)

@@ -1,8 +1,7 @@
 """Dishwashers: a tub with a door that drops down about a hinge at its bottom, or one or two that slide out as drawers.
 
-What varies: built-in, free-standing (with a worktop) or for the countertop; a door over the whole front, below a fixed
-strip of controls, or only over the upper half; between side panels or over them; where the hinge lies; handle, strips,
-relief and inner liner of the door; racks inside, fixed or on slides; spray arm; buttons and dials.
+What varies: built-in, free-standing or for the countertop; a door over the whole front, below a fixed strip, or over
+the upper half; where the hinge lies; handle, strips, relief and liner of the door; racks, spray arm, buttons, dials.
 """
 
 from dataclasses import dataclass

@@ -1,9 +1,7 @@
 """Dispensers: pumps for soap and lotion, soap boxes on a wall, drink dispensers with a tap, water coolers.
 
-What varies: the kind; the bottle's outline from above and from the side; a pump's head, its nozzle and stroke, whether
-its collar turns; one to three pumps on a tray; a lever, a push bar or a button of a soap box, and its cover, which
-swings up or down; a jar with a lid that lifts or swings, one or two taps with levers or wings, a stand; a cooler with
-its bottle, levers or buttons, and a door below. One to six parts move.
+What varies: bottle, pump head and collar, one to three pumps on a tray; lever, bar or buttons of a soap box and its
+cover; lid, taps and stand of a jar; bottle, taps and door of a cooler. One to six parts move.
 """
 
 import numpy as np
@@ -26,9 +24,6 @@ def build(draws: Draws) -> Assembly:
     kinds = {"pump": _pump_bottle, "soap_box": _soap_box, "drink_jar": _drink_jar, "water_cooler": _water_cooler}
     kind = draws.pick("kind", {"pump": 0.5, "soap_box": 0.18, "drink_jar": 0.2, "water_cooler": 0.12})
     return kinds[kind](draws)
-
-
-# --- pumps -----------------------------------------------------------------------------------------------------------
 
 
 def _pump_bottle(draws: Draws) -> Assembly:
@@ -109,9 +104,6 @@ def _bottle_levels(draws: Draws, depth: float, half: float, height: float, radiu
     return [*levels, (height, 1.1 * radius, 1.1 * radius, 1.0)]
 
 
-# --- a soap box on a wall -------------------------------------------------------------------------------------------
-
-
 def _soap_box(draws: Draws) -> Assembly:
     """A box with a cover in front, and a lever, a push bar or buttons below it."""
     depth, half = draws.length("depth", (0.07, 0.13)), 0.5 * draws.length("width", (0.1, 0.22))
@@ -166,9 +158,6 @@ def _soap_box(draws: Draws) -> Assembly:
         name = f"button_{number}" if len(spots) > 1 else "button"
         dispenser.add(name, solid, prismatic("body", (1, 0, 0), 0.0, 0.01, (back, y, z)))
     return dispenser
-
-
-# --- a jar with taps -------------------------------------------------------------------------------------------------
 
 
 def _drink_jar(draws: Draws) -> Assembly:
@@ -263,9 +252,6 @@ def _stand(draws: Draws, wide: float, foot: float) -> Solid:
         x, y = cos(a) * wide, sin(a) * wide
         solid += tube([(0.88 * x, 0.88 * y, foot - 0.004), (spread * x, spread * y, 0.004)], 0.006, 8)
     return solid
-
-
-# --- a water cooler --------------------------------------------------------------------------------------------------
 
 
 def _water_cooler(draws: Draws) -> Assembly:

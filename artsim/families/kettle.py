@@ -1,9 +1,7 @@
 """Kettles and teapots: for a stove, electric, for tea.
 
-What varies: the outline from the side (cone, drum, belly, ball, squat) and from above, the spout (beak, straight,
-gooseneck), the lid, which lifts off, turns, screws or swings about a hinge, its knob, the handle (a bow over the lid
-that swings down or that stands fast, or a grip at the back), a cover of the spout, a switch or a button, and the stand
-below, on which electric kettles turn or from which they lift. One to three parts move.
+What varies: outline, spout, knob; how the lid lifts off, turns, screws or swings; a bow over the lid that swings or
+stands fast, or a grip at the back; whistle, switch or button; a base on which it turns or from which it lifts.
 """
 
 import numpy as np
@@ -23,7 +21,7 @@ DENSITY = 500.0  # kg/m^3, as the pieces are solid and real ones are hollow
 
 
 class Pot:
-    """Levels of the body, radius of the opening, heights of foot and top; metres."""
+    """Levels of the body, its radius and that of the opening, heights of foot and top, hinge of the lid; metres."""
 
     def __init__(self, draws: Draws, kind: str, foot: float) -> None:
         wide = 0.5 * draws.length("width", (0.13, 0.24) if kind == "stove" else (0.11, 0.19))
@@ -51,7 +49,9 @@ class Pot:
         self.levels: list[Level] = [
             (foot + z * height, r * wide, r * wide, 1.0 if z == 1.0 else 0.0) for z, r in profile
         ]
-        self.mouth, self.foot, self.top = profile[-1][1] * wide, foot, foot + height
+        self.wide, self.mouth, self.foot, self.top = wide, profile[-1][1] * wide, foot, foot + height
+        # Distance of the hinge behind the axis, half length and radius of its barrel.
+        self.hinge = 1.04 * self.mouth + 1.3 * 0.0045, 0.22 * self.mouth, 0.0045
 
     def radius(self, z: float) -> float:
         """Half depth at a height."""
@@ -83,14 +83,17 @@ def build(draws: Draws) -> Assembly:
         body += handle
     lid, knob_top = _lid(draws, pot, lid_joint == "hinge")
     if lid_joint == "hinge":  # what carries its barrel, at both ends
-        x, half, r = _hinge(pot)
+        x, half, r = pot.hinge
         roots = (0.85 * pot.mouth, x + 0.5 * r), (pot.top - 0.02, pot.top - 0.012)
         body += cheeks((x, pot.top + GAP + r), r, half + 0.001, half + 0.007, *roots)
-    pins = Pins(draws, pot, max(room, knob_top + 0.012))
+    pin = pot.foot + draws.number("pin_height", (0.6, 0.9)) * (pot.top - pot.foot)
+    r = draws.length("bow_radius", (0.003, 0.006))
+    # So wide and so high that the bow passes around the body wherever it stands.
+    reach, crest = pot.wide + r + 0.004, max(room, knob_top + 0.012) + 2.4 * r
+    crest = max(crest, pin + 1.2 * pot.wide + 2.4 * r) + 0.01
     if swinging:
         for s in (-1.0, 1.0):
-            root, tip = (0, s * 0.6 * pins.reach, pins.z), (0, s * (pins.reach - pins.rod - GAP), pins.z)
-            body += hull_of(cylinder(root, tip, 1.6 * pins.rod))
+            body += hull_of(cylinder((0, s * 0.6 * reach, pin), (0, s * (reach - r - GAP), pin), 1.6 * r))
     switch = _switch(draws, pot) if kind == "electric" else None
     if switch is not None:
         body += switch[0]
@@ -98,7 +101,7 @@ def build(draws: Draws) -> Assembly:
     free = min(room - knob_top, over - pot.top - 0.02) if bow else np.inf
     kettle.add("lid", lid, _lid_joint(draws, lid_joint, pot, free))
     if swinging:
-        _swinging_bow(draws, kettle, pins)
+        _swinging_bow(draws, kettle, reach, pin, crest, r)
     if mouth is not None and kind == "stove" and draws.chance("whistle", 0.6):
         _whistle(draws, kettle, mouth)
     if standing:
@@ -114,7 +117,7 @@ def _spout(draws: Draws, kind: str, pot: Pot) -> tuple[Solid, tuple[Array, Array
     choice = draws.pick("spout", {"tube": 0.55, "goose": 0.3, "beak": 0.15})
     if kind == "electric":
         choice = draws.pick("electric_spout", {"beak": 0.75, "goose": 0.15, "tube": 0.1})
-    shoulder = pot.radius(pot.top - 0.1 * height) < 0.75 * max(level[1] for level in pot.levels)
+    shoulder = pot.radius(pot.top - 0.1 * height) < 0.75 * pot.wide
     if choice == "beak" and shoulder:  # a beak at a narrow rim would pour onto the body
         choice = "tube"
     if choice == "beak":
@@ -192,18 +195,12 @@ def _lid(draws: Draws, pot: Pot, hinged: bool) -> tuple[Solid, float]:
         top += 1.2 * size
     lid += knob.called("knob", UP)
     if hinged:
-        x, half, r = _hinge(pot)
+        x, half, r = pot.hinge
         lid += rod(x, (-half, half), z + r, r, sections=14)
         lid += box((0.8 * radius, x), half, (z, z + r))
     elif draws.chance("lid_bead", 0.5):  # a rim that reaches into the pot is hidden: only a plate shows
         lid += ring((0, 0, z + 0.5 * rim), UP, 0.9 * radius, 1.03 * radius, 0.6 * rim, 24)
     return lid, top
-
-
-def _hinge(pot: Pot) -> tuple[float, float, float]:
-    """Distance of the hinge behind the axis, half length and radius of its barrel."""
-    r = 0.0045
-    return 1.04 * pot.mouth + 1.3 * r, 0.22 * pot.mouth, r
 
 
 def _lid_joint(draws: Draws, kind: str, pot: Pot, room: float) -> JointSpec:
@@ -212,7 +209,7 @@ def _lid_joint(draws: Draws, kind: str, pot: Pot, room: float) -> JointSpec:
     if travel < 0.004:  # the bow holds it down
         kind = "turn"
     if kind == "hinge":
-        x, _, r = _hinge(pot)
+        x, _, r = pot.hinge
         upper = np.deg2rad(draws.degrees("lid_angle", (60.0, 88.0)))
         return revolute("body", (0, 1, 0), (x, 0, pot.top + GAP + r), 0.0, upper)
     if kind == "turn":
@@ -241,33 +238,20 @@ def _bow(draws: Draws, pot: Pot, room: float) -> tuple[Solid, float]:
     return solid.called("handle", UP), float(np.interp(-1.05 * pot.mouth, xs, zs)) - 2.0 * r
 
 
-class Pins:
-    """Where a swinging bow hangs: half distance and height of the pins, height of the bow, radius of its rod."""
-
-    def __init__(self, draws: Draws, pot: Pot, room: float) -> None:
-        self.z = pot.foot + draws.number("pin_height", (0.6, 0.9)) * (pot.top - pot.foot)
-        widest = max(level[2] for level in pot.levels)
-        self.rod = draws.length("bow_radius", (0.003, 0.006))
-        # So wide and so high that it passes around the body wherever it stands.
-        self.reach = widest + self.rod + 0.004
-        self.top = max(room + 2.4 * self.rod, self.z + 1.2 * widest + 2.4 * self.rod) + 0.01
-
-
-def _swinging_bow(draws: Draws, kettle: Assembly, pins: Pins) -> None:
+def _swinging_bow(draws: Draws, kettle: Assembly, reach: float, low: float, high: float, r: float) -> None:
     """A bow that hangs on two pins at the sides, upright at rest, and swings down to the back."""
-    rise, r = pins.top - pins.z, pins.rod
     if draws.chance("bow_square", 0.4):
-        path = [(0.0, y * pins.reach, pins.z + h * rise) for y, h in
-                ((-1, 0), (-1, 0.65), (-0.75, 1), (0.75, 1), (1, 0.65), (1, 0))]  # fmt: skip
+        corners = ((-1, 0), (-1, 0.65), (-0.75, 1), (0.75, 1), (1, 0.65), (1, 0))
+        path = [(0.0, y * reach, low + h * (high - low)) for y, h in corners]
     else:
-        path = [(0.0, y, pins.z + z) for y, z in arch(pins.reach, rise, 13, np.pi, 0.0)]
+        path = [(0.0, y, low + z) for y, z in arch(reach, high - low, 13, np.pi, 0.0)]
     bow = tube(path, r, 10)
     if draws.chance("bow_grip", 0.75):
         thick = r * draws.number("bow_grip_thickness", (1.5, 2.4))
-        bow += tube([(0, -0.4 * pins.reach, pins.top), (0, 0.4 * pins.reach, pins.top)], thick, 14)
+        bow += tube([(0, -0.4 * reach, high), (0, 0.4 * reach, high)], thick, 14)
     limit = np.deg2rad(draws.degrees("bow_angle", (20.0, 85.0)))
-    low = -np.deg2rad(draws.degrees("bow_angle_forward", (5.0, 20.0))) if draws.chance("bow_both_ways", 0.4) else 0.0
-    kettle.add("handle", bow, revolute("body", (0, 1, 0), (0, 0, pins.z), low, limit), density=1500.0)
+    lower = -np.deg2rad(draws.degrees("bow_angle_forward", (5.0, 20.0))) if draws.chance("bow_both_ways", 0.4) else 0.0
+    kettle.add("handle", bow, revolute("body", (0, 1, 0), (0, 0, low), lower, limit), density=1500.0)
 
 
 def _back_grip(draws: Draws, pot: Pot) -> Solid:

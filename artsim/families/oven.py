@@ -1,7 +1,7 @@
 """Ovens: cookers with a hob, ovens to build in, and cooktops whose knobs alone turn.
 
-What varies: one door or two that drop down, or one that opens sideways; a drawer below; a hob with gas grates, coils or
-a glass top; a guard at the back; dials in front or on the guard, with or without stops; window, handle, racks, feet.
+What varies: one or two doors that drop down, or one that opens sideways; a drawer; gas, coil or glass burners; a guard
+at the back; knobs in front or on the guard, with or without stops; window, handle, racks, feet.
 """
 
 from collections.abc import Sequence

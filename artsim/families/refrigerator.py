@@ -1,7 +1,6 @@
 """Refrigerators: small ones with one door, two doors above or beside each other, French doors over drawers.
 
-What varies: layout, side of the hinges, freezer above or below, doors or drawers; handles upright or level; bins in the
-doors, shelves, crispers; dispenser, feet, round edges, overhanging top.
+What varies: layout, hinges, freezer; handles upright or level; bins, shelves, crispers, dispenser, feet, edges, top.
 """
 
 from collections.abc import Sequence

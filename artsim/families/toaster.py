@@ -1,7 +1,6 @@
 """Toasters: a body with one to four slots, levers at the front end, a dial to set them.
 
-What varies: slots, short or long, one lever or two; box, arch or loaf; guides of the levers; dials, buttons; crumb tray
-at the back; feet or a base; rack for buns on top.
+What varies: slots, levers and their guides; box, arch, loaf or block; knobs, buttons, crumb tray, feet, bun rack.
 """
 
 import numpy as np

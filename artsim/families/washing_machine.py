@@ -1,8 +1,7 @@
 """Washing machines: front loaders with a porthole, top loaders with a lid.
 
-What varies: round or square door, hinged left or right, with a glass bowl or closed; drawer for the detergent; dials,
-keys and display; console of a top loader, its lid hinged at the back or at a side; a drum or agitator that turns;
-feet, plinth, worktop.
+What varies: round or square door with a glass bowl or closed, its hinge; drawer for the detergent, knob, buttons;
+console and lid of a top loader; a drum or agitator that turns; feet, plinth, worktop.
 """
 
 import numpy as np
@@ -41,9 +40,6 @@ def build(draws: Draws) -> Assembly:
 
 def _feet(s: Shape) -> Solid:
     return posts((0.06, s.depth - 0.06), s.half - 0.06, (0, s.low + 0.01), 0.025)
-
-
-# --- front loaders ---------------------------------------------------------------------------------------------------
 
 
 def _front_loader(draws: Draws, s: Shape) -> Assembly:
@@ -148,9 +144,6 @@ def _porthole(draws: Draws, z: float, hole: float, outer: float, thick: float, b
         return solid + grip.called("handle", FRONT)
     start, end = (x0, 0.02 - 0.97 * outer, z - 0.1 * outer), (x0, 0.02 - 0.97 * outer, z + 0.1 * outer)
     return solid + front_handle(draws.pick("handle", ["bow", "flat"]), start, end, reach, 0.006)
-
-
-# --- top loaders -----------------------------------------------------------------------------------------------------
 
 
 def _top_loader(draws: Draws, s: Shape) -> Assembly:
