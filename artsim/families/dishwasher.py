@@ -50,7 +50,7 @@ def build(draws: Draws) -> Assembly:
     if draws.pick("front", {"drawers": 0.12, "door": 0.88}) == "drawers":
         return _drawers(draws)
     compact = draws.chance("compact", 0.08)
-    half_door = draws.chance("half_door", 0.12) and not compact  # there is no room for it
+    upper_half = draws.chance("half_door", 0.12) and not compact  # there is no room for it
     narrow = draws.chance("narrow", 0.2) and not compact
     width = draws.length("width", (0.42, 0.48) if narrow else (0.54, 0.64))
     height = draws.length("height", (0.75, 0.95), of=width) if compact else draws.length("height", (0.70, 0.9))
@@ -60,7 +60,7 @@ def build(draws: Draws) -> Assembly:
     strip = draws.length("strip_height", (0.07, 0.14)) if draws.chance("fixed_strip", 0.4) else 0.0
     flush = draws.chance("flush", 0.3)  # what lies below the door is as far in front as the door
     flanked = draws.chance("door_between_sides", 0.35)
-    if half_door:
+    if upper_half:
         plinth, flush, strip = draws.number("half_door_place", (0.35, 0.5)) * height, True, max(strip, 0.09)
     elif flanked:
         strip = max(strip, wall)
@@ -69,30 +69,22 @@ def build(draws: Draws) -> Assembly:
         inside = draws.number("hinge_depth", (0.0, 0.6))
         hinge_x *= inside if draws.pick("hinge", ["back", "inside"]) == "inside" else 0.0
     swing = float(hypot(hinge_x, height - plinth)) - (height - plinth)  # the upper back edge rises while it opens
-    shape = Shape(
-        half=0.5 * width,
-        depth=draws.length("depth", (0.42, 0.64)),
-        height=height,
-        wall=wall,
-        thick=thick,
-        half_door=0.5 * width - (wall + GAP if flanked else draws.length("door_gap", (0.0, 0.004))),
-        bottom=plinth,
-        top=height - strip - 1.3 * swing - 2 * GAP,
-        hinge_x=hinge_x,
-        hinge_z=plinth + (0.0 if flush else draws.length("hinge_height", (0.0, 0.012))),
-        liner=draws.length("liner_depth", (0.005, 0.025)) if draws.chance("liner", 0.75) else 0.0,
-    )
+    half, depth, top = 0.5 * width, draws.length("depth", (0.42, 0.64)), height - strip - 1.3 * swing - 2 * GAP
+    half_door = half - (wall + GAP if flanked else draws.length("door_gap", (0.0, 0.004)))
+    hinge_z = plinth + (0.0 if flush else draws.length("hinge_height", (0.0, 0.012)))
+    liner = draws.length("liner_depth", (0.005, 0.025)) if draws.chance("liner", 0.75) else 0.0
+    shape = Shape(half, depth, height, wall, thick, half_door, plinth, top, hinge_x, hinge_z, liner)
     racks = draws.pick("rack_mount", {"none": 0.4, "fixed": 0.4, "sliding": 0.2})
     machine = Assembly()
     body = _body(draws, shape, strip, flush, flanked, compact)
     if racks == "fixed":
-        front, back, half = shape.liner + shape.front + 0.01, shape.depth - shape.wall + 0.002, shape.half - shape.wall
-        body += union(_rack(draws, front, back, half + 0.002, low) for low in _rack_heights(shape))
+        front, back, side = liner + shape.front + 0.01, depth - wall + 0.002, half - wall + 0.002
+        body += union(_rack(draws, front, back, side, low) for low in _rack_heights(shape))
     machine.add("body", body, density=300.0)
     level = draws.chance("door_opens_level", 0.7)
     opening = 0.5 * np.pi if level else np.deg2rad(draws.degrees("door_angle", (75.0, 90.0)))
-    hinge = (shape.hinge_x, 0.0, shape.hinge_z)
-    machine.add("door", _door(draws, shape, strip > 0.05, machine), revolute("body", (0, -1, 0), hinge, 0.0, opening))
+    hinge = revolute("body", (0, -1, 0), (hinge_x, 0.0, hinge_z), 0.0, opening)
+    machine.add("door", _door(draws, shape, strip > 0.05, machine), hinge)
     if strip > 0.05 and draws.chance("controls", 0.6):
         _controls(draws, machine, shape)
     if racks == "sliding":
@@ -106,19 +98,13 @@ def _drawers(draws: Draws) -> Assembly:
     half, depth = 0.5 * draws.length("width", (0.5, 0.64)), draws.length("depth", (0.42, 0.62))
     wall, plinth = draws.length("wall", (0.012, 0.03)), draws.length("plinth_height", (0.015, 0.1))
     tall = draws.length("drawer_height", (0.4, 0.75) if count == 1 else (0.34, 0.42))
-    shape = Shape(
-        half=half,
-        depth=depth,
-        height=plinth + count * tall,
-        wall=wall,
-        thick=draws.length("door_thickness", (0.02, 0.05)),
-        half_door=half + draws.length("front_overlap", (-0.002, 0.025)),
-        bottom=plinth - (draws.length("front_overlap_below", (0.0, 0.012)) if count == 1 else 0.0),
-        top=plinth + tall + (draws.length("front_overlap_above", (-0.003, 0.012)) if count == 1 else -0.004),
-        hinge_x=0.0,
-        hinge_z=plinth,
-        liner=0.0,
-    )
+    height, thick = plinth + count * tall, draws.length("door_thickness", (0.02, 0.05))
+    half_door = half + draws.length("front_overlap", (-0.002, 0.025))
+    bottom, top = plinth, plinth + tall - 0.004
+    if count == 1:
+        bottom = plinth - draws.length("front_overlap_below", (0.0, 0.012))
+        top = plinth + tall + draws.length("front_overlap_above", (-0.003, 0.012))
+    shape = Shape(half, depth, height, wall, thick, half_door, bottom, top, hinge_x=0.0, hinge_z=plinth, liner=0.0)
     body = tray((shape.front, -half, plinth), (depth, half, shape.height), wall, axis=0, side=-1)
     recess = shape.front + draws.length("plinth_setback", (0.0, 0.06))
     body += box((recess, depth), half - 0.005, (0.0, plinth + 0.003))
