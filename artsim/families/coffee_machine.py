@@ -303,9 +303,9 @@ def _urn(draws: Draws) -> Assembly:
         box(0.7 * side_x, 0.7 * side_y, (seam, crown), fillet=0.7 * share * radius, axis=2, steps=5),
     )
     if draws.chance("lid_knob", 0.75):
-        grip = x * draws.number("knob_size", (0.08, 0.16))
-        knob = rod(0, 0, (crown - 0.002, crown + grip), 0.6 * grip, sections=14)
-        knob += rod(0, 0, (crown + 0.9 * grip, crown + 1.8 * grip), 1.3 * grip, grip, 18)
+        size = x * draws.number("knob_size", (0.08, 0.16))
+        knob = rod(0, 0, (crown - 0.002, crown + size), 0.6 * size, sections=14)
+        knob += rod(0, 0, (crown + 0.9 * size, crown + 1.8 * size), 1.3 * size, size, 18)
         lid += knob.called("knob", UP)
     if draws.pick("lid_joint", {"lift": 0.65, "hinge": 0.35}) == "lift":
         # Short ways are drawn as often as long ones.

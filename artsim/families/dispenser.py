@@ -135,9 +135,9 @@ def _soap_box(draws: Draws) -> Assembly:
         x, z, r = front - 0.004 - CLEAR - 0.004, 0.65 * low, 0.004
         reach = draws.length("lever_length", (0.04, 0.16))
         wide = 0.5 * half
-        bend, tip = (x - 0.3 * reach, 0, z - 0.02), (x - reach, 0, z - 0.03 - 0.3 * reach)
+        bend, pad = (x - 0.3 * reach, 0, z - 0.02), (x - reach, 0, z - 0.03 - 0.3 * reach)
         solid = tube([(x, 0, z), bend], r, 10) + hull_of(
-            *(box(about(u, 0.003), w, about(v, 0.003), fillet=0.002) for (u, _, v), w in ((bend, 0.006), (tip, wide)))
+            *(box(about(u, 0.003), w, about(v, 0.003), fillet=0.002) for (u, _, v), w in ((bend, 0.006), (pad, wide)))
         )
         solid += rod(x, (-0.4 * wide, 0.4 * wide), z, r, sections=12)
         turn = revolute("body", (0, -1, 0), (x, 0.0, z), 0.0, draws.angle("lever_angle", (0.1, 0.3)))

@@ -156,8 +156,8 @@ def _top_loader(draws: Draws, s: Shape) -> Assembly:
     body = tray((0, -s.half, s.low), (s.depth, s.half, s.high - 0.5 * deck), 0.012) + _feet(s)
     body += holed_plate((0, -s.half, s.high - deck), (s.depth, s.half, s.high), center, radius, 2, 20)
     slope = draws.number("console_slope", (0.0, 0.5)) * console
-    low, high = s.high - 0.002, s.high + rise
-    face = [(back + 0.004, low), (back + 0.004 + slope, high), (s.depth, high), (s.depth, low)]
+    foot, crest = s.high - 0.002, s.high + rise
+    face = [(back + 0.004, foot), (back + 0.004 + slope, crest), (s.depth, crest), (s.depth, foot)]
     body += hull([(x, y, z) for x, z in face for y in (-s.half, s.half)]).called("panel", FRONT)
     upright = slope < 0.2 * console
     if upright:  # dials stand on its face
