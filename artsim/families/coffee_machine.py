@@ -106,14 +106,17 @@ def _controls(draws: Draws, machine: Assembly, face: float, y: float, low: float
     """Knobs and buttons in a row on the front of the head."""
     z = 0.5 * (low + high)
     room = 0.36 * (high - low)
-    for number, share in enumerate(np.linspace(-1.0, 1.0, draws.integer("control_count", 1, 3) + 2)[1:-1]):
+    count = draws.integer("control_count", 1, 3)
+    if y < 0.03:  # a narrow or round front has room for one
+        count, y = 1, 0.06
+    for number, share in enumerate(np.linspace(-1.0, 1.0, count + 2)[1:-1]):
         center = (face, share * 0.9 * y, z)
         if draws.pick("control", {"knob": 0.5, "button": 0.5}) == "knob":
             size = min(draws.length("knob_radius", (0.012, 0.024)), room, 0.2 * y)
             turn = continuous("body", FRONT, center)
             machine.add(f"knob_{number}", dial(center, FRONT, 0.018, size), turn, density=900.0)
         else:
-            size = min(draws.length("button_radius", (0.008, 0.012)), room)
+            size = min(draws.length("button_radius", (0.008, 0.012)), room, 0.22 * y)
             key = rod((face - 0.0032, face - 0.011), center[1], z, size, 0.92 * size, 16)
             machine.add(f"button_{number}", key, prismatic("body", (1, 0, 0), 0.0, 0.0025, center), density=900.0)
 
@@ -319,5 +322,5 @@ def _urn(draws: Draws) -> Assembly:
         joint = revolute("body", (0, 1, 0), hinge, 0.0, limit)
     machine.add("lid", lid, joint)
     if niche and draws.chance("controls", 0.6):
-        _controls(draws, machine, -x, 0.5 * (y - radius) if radius < 0.7 * y else 0.001, height - head, height)
+        _controls(draws, machine, -x, y - radius, height - head, height)
     return machine
