@@ -25,7 +25,8 @@ def build(draws: Draws) -> Assembly:
     if draws.chance("cooktop", 0.12):
         return _cooktop(draws)
     built_in = draws.chance("built_in", 0.25)
-    half = 0.5 * (draws.length("width", (0.54, 0.62)) if built_in else draws.length("width", (0.48, 0.78), (0.44, 1.0)))
+    usual, widest = ((0.54, 0.62), (0.54, 0.76)) if built_in else ((0.48, 0.78), (0.44, 1.0))
+    half = 0.5 * draws.length("width", usual, widest)
     depth = draws.length("depth", (0.5, 0.66), (0.42, 0.72))
     height = draws.length("height", (0.44, 0.62) if built_in else (0.82, 0.95))
     two = not built_in and draws.pick("doors", {2: 0.2, 1: 0.8}) == 2
@@ -34,9 +35,9 @@ def build(draws: Draws) -> Assembly:
     plain = built_in or draws.pick("back", {"plain": 0.55, "guard": 0.45}) == "plain"
     guard = 0.0 if plain else draws.length("guard_height", (0.06, 0.2))
     on_guard = guard > 0.11 and draws.chance("knobs_on_guard", 0.6)
-    usual, widest = ((0.02, 0.05), None) if on_guard else ((0.08, 0.13), (0.07, 0.2))
+    usual, widest = ((0.02, 0.05), (0.02, 0.05)) if on_guard else ((0.08, 0.13), (0.07, 0.2))
     strip = draws.length("strip_height", usual, widest)
-    plinth = 0.01 if built_in else draws.length("plinth_height", (0.03, 0.11))
+    plinth = draws.length("plinth_height", (0.003, 0.01) if built_in else (0.03, 0.11))
     has_drawer = not built_in and not two and draws.pick("drawers", {1: 0.55, 0: 0.45}) == 1
     drawer = draws.length("drawer_height", (0.13, 0.2)) if has_drawer else 0.0
     ceiling = height - strip
@@ -69,7 +70,8 @@ def build(draws: Draws) -> Assembly:
     oven.add("body", body, density=350.0)
 
     sideways = not two and draws.chance("door_sideways", 0.1)
-    kind, reach = draws.pick("handle", ["bar", "bow", "flat"]), draws.length("handle_reach", (0.035, 0.055))
+    kind = draws.pick("handle", ["bar", "bow", "flat"])
+    reach = draws.length("handle_reach", (0.035, 0.055), (0.035, 0.085))
     for number, (low, high) in enumerate(pairwise(edges), 1):
         corner_low = np.array([-thick, 0.001 - half, low + GAP])
         # The upper back edge of a door that drops rises before it falls.
@@ -214,14 +216,15 @@ def _controls(draws: Draws, oven: Assembly, half: float, face: float, z: float, 
     count = draws.integer("knobs", 2, 7)
     reach = draws.length("knob_reach", (0.018, 0.035), (0.01, 0.055))
     stops = draws.chance("knob_stops", 0.35)
-    end = draws.number("knob_row", (0.85, 0.85), (0.85, 1.1), tails=0.3)  # its length, with a gap before it
+    end = draws.number("knob_row", (0.85, 0.85), (0.85, 1.2), tails=0.3)  # its length, with a gap before it
     ys = np.linspace(-end, end, count + 2)[1:-1] * half
     if draws.chance("knobs_in_two_groups", 0.4):
         ys = np.sign(ys + 1e-6) * (0.25 + 0.65 * np.abs(ys) / half) * half
-    room = min(0.75 * room, 0.42 * float(np.diff(ys).min()), half - float(np.abs(ys).max()) - 0.002)
+    gap = float(np.diff(ys).min())
+    room = min(0.75 * room, 0.42 * gap, half - float(np.abs(ys).max()) - 0.002)
     radius = min(draws.length("knob_radius", (0.016, 0.026), (0.01, 0.045)), room)
     _add_knobs(oven, [(face, y, z) for y in ys.tolist()], FRONT, FRONT, reach, radius, stops)
-    if count < 4 and draws.chance("buttons_between", 0.5):
+    if count < 4 and draws.chance("buttons_between", 0.5) and 0.5 * gap - radius > 0.011:
         for number, y in enumerate((0.5 * (ys[:-1] + ys[1:])).tolist(), 1):
             point = (face, y, z)
             button = push_button(point, (0.018, 0.012), 0.003)
