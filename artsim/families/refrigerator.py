@@ -24,7 +24,7 @@ class Style:
     """What the doors of one refrigerator share; lengths in metres."""
 
     def __init__(self, draws: Draws) -> None:
-        self.thick = draws.length("door_thickness", (0.03, 0.075))
+        self.thick = draws.length("door_thickness", (0.03, 0.075), (0.008, 0.075), tails=0.15)
         radius = draws.length("edge_radius", (0.005, 0.025))
         self.corner = radius if draws.pick("edges", ["sharp", "round"]) == "round" else 0.003
         self.wall = draws.length("wall", (0.035, 0.06))  # of the body
@@ -45,7 +45,8 @@ def build(draws: Draws) -> Assembly:
     width = min(width, 0.6) if small else width
     tall = draws.length("height", (0.5, 0.9) if small else (1.35, 1.9))
     tall = max(tall, 1.02 * width) if small else tall
-    half, depth = 0.5 * width, draws.length("depth", (0.45, 0.6) if small else (0.5, 0.72))
+    usual, widest = ((0.45, 0.6), (0.42, 0.6)) if small else ((0.5, 0.72), (0.42, 0.72))
+    half, depth = 0.5 * width, draws.length("depth", usual, widest)
     foot = draws.length("foot_height", (0.015, 0.1))
     style = Style(draws)
     top, side = foot + tall, draws.side("hinge_side")
@@ -66,7 +67,7 @@ def build(draws: Draws) -> Assembly:
 
     fridge = Assembly("body", _body(draws, half, depth, foot, top, style, fronts, small), 120.0)
     fridge.record(handles=style.handle != "none")
-    opening = np.deg2rad(draws.degrees("door_angle", (90.0, 179.0)))
+    opening = np.deg2rad(draws.degrees("door_angle", (85.0, 180.0)))
     doors = drawers = 0
     dispenser = broad and draws.chance("dispenser", 0.5)
     for side, right, left, low, high in fronts:
