@@ -9,15 +9,9 @@ from numpy.typing import ArrayLike
 from artsim.common.elementary import arctan2, cos, sin
 from artsim.common.products import unit
 from artsim.making.assembly import JointSpec, revolute
-from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, Span, Vector, ends, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, deferred, frame, hull, hull_of, prism, rod, tube, union
 from artsim.model.kinematics import Array
-
-
-def drawn_side(draws: Draws, name: str) -> float:
-    """A side of the object, each as likely: -1.0 for the right (-Y) of who looks at its front, 1.0 for the left."""
-    return {"right": -1.0, "left": 1.0}[draws.pick(name, ["right", "left"])]
 
 
 @deferred
