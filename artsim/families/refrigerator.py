@@ -43,8 +43,8 @@ def build(draws: Draws) -> Assembly:
     broad = layout in ("beside", "french")
     width = draws.length("width", (0.78, 0.95) if broad else (0.45, 0.72))
     width = min(width, 0.6) if small else width
-    tall = draws.length("height", (0.5, 0.9) if small else (1.35, 1.9))
-    tall = max(tall, 1.02 * width) if small else tall
+    usual, widest = ((0.5, 0.9), (0.5, 1.0)) if small else ((1.35, 1.9), (1.0, 1.9))
+    tall = max(draws.length("height", usual, widest, tails=0.15), 1.02 * width)
     usual, widest = ((0.45, 0.6), (0.42, 0.6)) if small else ((0.5, 0.72), (0.42, 0.72))
     half, depth = 0.5 * width, draws.length("depth", usual, widest)
     foot = draws.length("foot_height", (0.015, 0.1))
