@@ -1,6 +1,6 @@
 """Details that several families share: handles and hinged panels."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -9,9 +9,18 @@ from numpy.typing import ArrayLike
 from artsim.common.elementary import arctan2, cos, sin
 from artsim.common.products import unit
 from artsim.making.assembly import JointSpec, revolute
+from artsim.making.draws import Draws, Interval
 from artsim.making.outlines import FRONT, Span, Vector, ends, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, deferred, frame, hull, hull_of, prism, rod, tube, union
 from artsim.model.kinematics import Array
+
+
+def drawn_from(
+    draws: Draws, name: str, spans: Mapping[str, Interval], chances: Mapping[str, float] | None = None
+) -> float:
+    """A number from one of several ranges: all are drawn from (``corner_round``), and one is picked (``corner``)."""
+    values = {word: draws.number(f"{name}_{word}", span) for word, span in spans.items()}
+    return values[draws.pick(name, chances or list(spans))]
 
 
 @deferred
