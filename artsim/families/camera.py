@@ -5,95 +5,111 @@ three tubes that slide out of each other, a cap), dials and buttons on top and a
 screen that swings out at the back or at the side, a back that opens, a door at the side. Two to eleven parts move.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 from artsim.common.elementary import cos, sin
+from artsim.families.details import drawn_side
 from artsim.families.lenses import Lens
-from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute, swivel
-from artsim.making.outlines import FRONT, UP, about, turns
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, prism, ring, rod, tube
+from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, swivel
+from artsim.making.draws import Draws
+from artsim.making.outlines import FRONT, SIDE, UP, about, turns
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, prism, ring, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
 DENSITY = 900.0
+_MEASURES = {
+    "compact": ((0.084, 0.12), (1.05, 1.45), (0.35, 0.75)),
+    "reflex": ((0.11, 0.16), (1.15, 1.6), (0.5, 0.95)),
+    "rangefinder": ((0.11, 0.15), (1.0, 1.35), (0.4, 0.65)),
+    "instant": ((0.1, 0.15), (1.3, 2.1), (0.6, 1.3)),
+}
+"""Width of a body, metres; its height and depth over half of that."""
+_ROUND = {"all": None, "upright": 2, "crosswise": 1, "lengthwise": 0}
+"""Which edges are round: the axis along which they lie."""
 
 
 class Shell:
     """Half width, depth and height of a body with its front at x = 0; place and largest radius of the lens; metres."""
 
-    def __init__(self, rng: Rng, kind: str) -> None:
-        # Half width; height and depth over it.
-        half, tall, deep = {
-            "compact": (rng.uniform(0.042, 0.06), (1.05, 1.45), (0.35, 0.75)),
-            "reflex": (rng.uniform(0.055, 0.08), (1.15, 1.6), (0.5, 0.95)),
-            "rangefinder": (rng.uniform(0.055, 0.075), (1.0, 1.35), (0.4, 0.65)),
-            "instant": (rng.uniform(0.05, 0.075), (1.3, 2.1), (0.6, 1.3)),
-        }[kind]
-        self.half, self.height, self.depth = half, half * rng.uniform(*tall), half * rng.uniform(*deep)
-        radius = self.height * (rng.uniform(0.24, 0.4) if kind != "instant" else rng.uniform(0.18, 0.3))
-        y = half * rng.choice([0.0, rng.uniform(-0.35, 0.1)])
+    def __init__(self, draws: Draws, kind: str) -> None:
+        wide, tall, deep = _MEASURES[kind]
+        place = list(_MEASURES).index(kind)
+        draws.rng.random(place)  # the width has a draw for each kind, one of which counts
+        self.half = half = 0.5 * draws.length("width", wide)
+        draws.rng.random(len(_MEASURES) - 1 - place)
+        self.height, self.depth = half * draws.number("height", tall), half * draws.number("depth", deep)
+        radius = self.height * draws.number("lens_radius", (0.24, 0.4) if kind != "instant" else (0.18, 0.3))
+        shift = draws.number("lens_shift", (-0.35, 0.1))
+        y = half * shift if draws.pick("lens_place", ["middle", "aside"]) == "aside" else 0.0
         self.lens_y = float(np.clip(y, -half + radius + 0.004, half - radius - 0.014))
-        self.lens_z = self.height * rng.uniform(0.42, 0.52)
+        self.lens_z = self.height * draws.number("lens_height", (0.42, 0.52))
         self.lens_radius = min(radius, self.lens_z - 0.002)
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """A camera; its lens looks towards -X and is drawn in at rest, all covers are shut."""
-    kind = pick(
-        rng, {"compact": 0.26, "reflex": 0.27, "rangefinder": 0.17, "instant": 0.1, "camcorder": 0.12, "swivel": 0.08}
-    )
+    kinds = {"compact": 0.26, "reflex": 0.27, "rangefinder": 0.17, "instant": 0.1, "camcorder": 0.12, "swivel": 0.08}
+    kind = draws.pick("kind", kinds)
     if kind == "camcorder":
-        return _camcorder(rng)
+        return _camcorder(draws)
     if kind == "swivel":
-        return _swivel(rng)
-    shell = Shell(rng, kind)
-    body, top = _body(rng, shell, kind)
+        return _swivel(draws)
+    shell = Shell(draws, kind)
+    body, top = _body(draws, shell, kind)
     styles = {"compact": ["tubes"], "instant": ["tubes", "prime"]}
-    style = pick(rng, styles.get(kind, ["tubes", "prime", "zoom", "zoom"]))
-    lens = Lens(rng, (0.0, shell.lens_y, shell.lens_z), shell.lens_radius, style)
+    style = draws.pick("lens", styles.get(kind, ["tubes", "prime", "zoom", "zoom"]))
+    lens = Lens(draws, (0.0, shell.lens_y, shell.lens_z), shell.lens_radius, style)
     camera = Assembly("body", body + lens.fixed, DENSITY)
     lens.add_to(camera)
-    _add_controls(rng, camera, shell, top, kind)
-    _back(rng, camera, shell)
-    if kind != "compact" and top[1] - top[0] > 0.01 and rng.random() < 0.5:
-        _flash(rng, camera, shell, top)
+    _add_controls(draws, camera, shell, top, kind)
+    _back(draws, camera, shell)
+    if kind != "compact" and top[1] - top[0] > 0.01 and draws.chance("flash", 0.5):
+        _flash(draws, camera, shell, top)
     return camera
 
 
-def _body(rng: Rng, shell: Shell, kind: str) -> tuple[Solid, tuple[float, float, float]]:
+def _body(draws: Draws, shell: Shell, kind: str) -> tuple[Solid, tuple[float, float, float]]:
     """The body; the span along Y and the height of what stands on its middle, for a flash."""
     half, depth, height = shell.half, shell.depth, shell.height
-    r = min(rng.uniform(0.05, 0.45) * depth, 0.4 * height)
-    axis = [None, 2, 1, 0][int(rng.integers(4))]
+    r = min(draws.number("edge_radius", (0.05, 0.45)) * depth, 0.4 * height)
+    axis = _ROUND[draws.pick("round_edges", list(_ROUND))]
     body = box((0, depth), half, (0, height), fillet=r, axis=axis)
-    if rng.random() < 0.4:  # covering between two metal plates
+    if draws.chance("covering", 0.4):  # covering between two metal plates
         body += box((-0.001, depth + 0.001), half + 0.0005, (0.16 * height, 0.8 * height), fillet=r, axis=2)
-    if kind in ("reflex", "compact") and rng.random() < (0.85 if kind == "reflex" else 0.4):  # grip of the right hand
-        deep = depth * (rng.uniform(0.2, 0.6) if kind == "reflex" else rng.uniform(0.05, 0.2))
+    if kind in ("reflex", "compact") and draws.chance("grip", 0.85 if kind == "reflex" else 0.4):  # of the right hand
+        deep = depth * draws.number("grip_depth", (0.2, 0.6) if kind == "reflex" else (0.05, 0.2))
         room = max(half - shell.lens_y - shell.lens_radius - 0.004, 0.008)
-        wide = min(rng.uniform(0.25, 0.5) * half, room)
+        wide = min(draws.number("grip_width", (0.25, 0.5)) * half, room)
         upright = (0.02 * height, 0.97 * height)
-        body += box((-deep, 0.6 * depth), (half - wide, half), upright, fillet=0.45 * wide, axis=2)
+        grip = box((-deep, 0.6 * depth), (half - wide, half), upright, fillet=0.45 * wide, axis=2)
+        body += grip.called("handle", FRONT)
     span = (0.0, 0.0, height)
     if kind == "reflex":
-        wide = half * rng.uniform(0.28, 0.42)
-        rise = height * rng.uniform(0.14, 0.32)
+        wide = half * draws.number("prism_width", (0.28, 0.42))
+        rise = height * draws.number("prism_height", (0.14, 0.32))
         y = float(np.clip(shell.lens_y, -half + wide, half - wide))
         low = [(y - wide, height - 0.002), (y + wide, height - 0.002)]
-        crest = [(y + wide * rng.uniform(0.4, 0.85), height + rise), (y - wide * rng.uniform(0.4, 0.85), height + rise)]
-        body += prism(low + crest, rng.uniform(-0.15, 0.2) * depth, rng.uniform(0.8, 1.1) * depth, 0)
+        left, right = draws.numbers("prism_crest", 0.4, 0.85, 2) * wide
+        crest = [(y + left, height + rise), (y - right, height + rise)]
+        front, back = draws.number("prism_front", (-0.15, 0.2)), draws.number("prism_back", (0.8, 1.1))
+        body += prism(low + crest, front * depth, back * depth, 0)
         upright = (height - 0.2 * rise, height + 0.7 * rise)
-        body += box((depth - 0.004, 1.15 * depth), about(y, 0.5 * wide), upright, fillet=0.004)
+        eyepiece = box((depth - 0.004, 1.15 * depth), about(y, 0.5 * wide), upright, fillet=0.004)
+        body += eyepiece.called("glass", -FRONT)
         span = (y - 0.4 * wide, y + 0.4 * wide, height + rise)
     elif kind == "rangefinder":
-        if rng.random() < 0.6:  # a raised deck
-            y0, y1 = sorted(rng.uniform(-0.95, 0.95, 2) * half)
+        if draws.chance("raised_deck", 0.6):
+            y0, y1 = sorted(draws.numbers("deck_end", -0.95, 0.95, 2) * half)
             body += box((0.05 * depth, 0.95 * depth), (y0, y1), (height - 0.003, height + 0.06 * height), fillet=0.002)
         for y, size in ((-0.75, 0.1), (0.3, 0.07)):  # windows
-            body += box((-0.0012, 0.002), ((y - size) * half, (y + size) * half), (0.8 * height, 0.93 * height))
+            window = box((-0.0012, 0.002), ((y - size) * half, (y + size) * half), (0.8 * height, 0.93 * height))
+            body += window.called("glass", FRONT)
     elif kind == "instant":
-        rise = height * rng.uniform(0.1, 0.35)
-        wide = half * rng.uniform(0.3, 0.98)
+        rise = height * draws.number("top_height", (0.1, 0.35))
+        wide = half * draws.number("top_width", (0.3, 0.98))
         body += hull_of(
             box((0.2 * depth, depth), wide, (height - 0.002, height)),
             box((0.4 * depth, depth), 0.9 * wide, (height + rise - 0.002, height + rise)),
@@ -102,15 +118,16 @@ def _body(rng: Rng, shell: Shell, kind: str) -> tuple[Solid, tuple[float, float,
         body += box((-0.3 * depth, 0.1 * depth), half, (0, slot), fillet=0.004)
         span = (-0.6 * wide, 0.6 * wide, height + rise)
     if kind in ("compact", "instant"):
-        y = half * rng.uniform(0.3, 0.7) * rng.choice([-1.0, 1.0])
-        body += box((-0.0012, 0.003), about(y, 0.14 * half), (0.8 * height, 0.93 * height), fillet=0.002, axis=0)
-    if kind in ("reflex", "rangefinder") and rng.random() < 0.4:  # lugs for a strap
+        y = half * draws.number("window_place", (0.3, 0.7)) * drawn_side(draws, "window_side")
+        window = box((-0.0012, 0.003), about(y, 0.14 * half), (0.8 * height, 0.93 * height), fillet=0.002, axis=0)
+        body += window.called("glass", FRONT)
+    if kind in ("reflex", "rangefinder") and draws.chance("lugs", 0.4):  # for a strap
         for s in (-1.0, 1.0):
             body += ring((0.5 * depth, s * (half + 0.002), 0.85 * height), (1, 0, 0), 0.0018, 0.004, 0.0018, 12)
     return body, span
 
 
-def _add_controls(rng: Rng, camera: Assembly, shell: Shell, middle: tuple[float, float, float], kind: str) -> None:
+def _add_controls(draws: Draws, camera: Assembly, shell: Shell, middle: tuple[float, float, float], kind: str) -> None:
     """Shutter button and dials, on seats on the deck, beside what stands on its middle."""
     half, depth = shell.half, shell.depth
     z = shell.height * (1.06 if kind == "rangefinder" else 1.0) + GAP
@@ -128,62 +145,63 @@ def _add_controls(rng: Rng, camera: Assembly, shell: Shell, middle: tuple[float,
     size = min(0.3 * depth, 0.18 * (half - right), 0.011)
     if size > 0.0015:
         spots = np.linspace(right + 1.3 * size, half - 1.5 * size, 2 if half - right < 7.8 * size else 3).tolist()
-        r = size * rng.uniform(0.6, 0.9)
-        at = np.array([depth * rng.uniform(0.3, 0.6), spots.pop(), z])
+        r = size * draws.number("shutter_radius", (0.6, 0.9))
+        at = np.array([depth * draws.number("shutter_place", (0.3, 0.6)), spots.pop(), z])
         button = cylinder(at + (0, 0, 0.0016), at + (0, 0, 0.0016 + 0.5 * r), r, 0.9 * r, 18)
         add("shutter_button", button, prismatic("body", -UP, 0.0, 0.0015, at), r, "button")
         for number, y in enumerate(spots):
-            if rng.random() < 0.75:
-                at = np.array([rng.uniform(0.4, 0.6) * depth, y, z])
-                add(f"dial_{number}", _dial(rng, at, size), continuous("body", UP, at), size)
+            if draws.chance("dial", 0.75):
+                at = np.array([draws.number("dial_place", (0.4, 0.6)) * depth, y, z])
+                add(f"dial_{number}", _dial(draws.within("dial"), at, size), continuous("body", UP, at), size)
     room = half + left
-    if kind in ("reflex", "rangefinder") and room > 0.012 and rng.random() < 0.65:
+    if kind in ("reflex", "rangefinder") and room > 0.012 and draws.chance("knob", 0.65):
         size = min(0.3 * depth, 0.4 * room, 0.012)
         at = np.array([0.5 * depth, 0.5 * (left - half), z])
-        crank = _dial(rng, at, size)
-        if rng.random() < 0.4:
+        crank = _dial(draws.within("knob"), at, size)
+        if draws.chance("knob_crank", 0.4):
             low, high = at + (-0.15 * size, -0.9 * size, 0.8 * size), at + (0.15 * size, 0.9 * size, 1.2 * size)
             crank += box(low, high, fillet=0.1 * size)
         add("knob", crank, continuous("body", UP, at), size, "knob")
 
 
-def _dial(rng: Rng, foot: Array, radius: float) -> Solid:
+def _dial(draws: Draws, foot: Array, radius: float) -> Solid:
     """A flat dial, knurled by chance."""
-    tall = radius * rng.uniform(0.4, 1.1)
-    solid = cylinder(foot, foot + tall * UP, radius, radius * rng.uniform(0.9, 1.0), 20)
-    if rng.random() < 0.5:
+    tall = radius * draws.number("height", (0.4, 1.1))
+    solid = cylinder(foot, foot + tall * UP, radius, radius * draws.number("taper", (0.9, 1.0)), 20)
+    if draws.chance("knurled", 0.5):
         for a in turns(10):
             edge = foot + (radius * cos(a), radius * sin(a), 0)
             solid += cylinder(edge + 0.1 * tall * UP, edge + 0.9 * tall * UP, 0.07 * radius, sections=4)
-    if rng.random() < 0.4:
+    if draws.chance("cap", 0.4):
         solid += cylinder(foot + 0.9 * tall * UP, foot + 1.3 * tall * UP, 0.4 * radius, sections=12)
     return solid
 
 
-def _back(rng: Rng, camera: Assembly, shell: Shell) -> None:
+def _back(draws: Draws, camera: Assembly, shell: Shell) -> None:
     """A screen that swings or tilts, or buttons; and a door for the battery at the side."""
     half, depth, height = shell.half, shell.depth + 0.001, shell.height
-    kind = pick(rng, {"fixed": 0.25, "swing": 0.25, "tilt": 0.15, "back": 0.1, "none": 0.25})
-    y0, y1 = -0.92 * half, half * rng.uniform(0.2, 0.5)
-    z0, z1 = height * rng.uniform(0.08, 0.14), height * rng.uniform(0.68, 0.8)
-    thick = rng.uniform(0.002, 0.006)
+    kind = draws.pick("back", {"plain": 0.25, "swing": 0.25, "tilt": 0.15, "door": 0.1, "bare": 0.25})
+    y0, y1 = -0.92 * half, half * draws.number("screen_width", (0.2, 0.5))
+    z0, z1 = height * draws.number("screen_bottom", (0.08, 0.14)), height * draws.number("screen_top", (0.68, 0.8))
+    thick = draws.length("screen_thickness", (0.002, 0.006))
     x = depth + GAP
     screen = box((x, x + thick), (y0, y1), (z0, z1), fillet=0.003, axis=0)
     if kind == "swing":
-        camera.add("screen", screen, revolute("body", -UP, (x + thick, y0, z0), 0.0, rng.uniform(1.2, 3.0)))
-    elif kind == "tilt":
-        upward = rng.random() < 0.5  # about its upper edge
-        joint = revolute("body", (0, -1 if upward else 1, 0), (x + thick, 0, z1 if upward else z0), 0.0,
-                         rng.uniform(0.5, 1.5))  # fmt: skip
+        joint = revolute("body", -UP, (x + thick, y0, z0), 0.0, draws.angle("screen_angle", (1.2, 3.0)))
         camera.add("screen", screen, joint)
-    elif kind == "back":  # the whole back of a film camera opens
+    elif kind == "tilt":
+        upward = draws.chance("screen_tilts_up", 0.5)  # about its upper edge
+        hinge = (x + thick, 0, z1 if upward else z0)
+        joint = revolute("body", (0, -1 if upward else 1, 0), hinge, 0.0, draws.angle("screen_tilt", (0.5, 1.5)))
+        camera.add("screen", screen, joint)
+    elif kind == "door":  # the whole back of a film camera opens
         leaf = box((x, x + thick), 0.97 * half, (0.06 * height, 0.92 * height), fillet=0.002, axis=0)
-        camera.add("back", leaf, revolute("body", -UP, (x + thick, -0.97 * half, 0), 0.0, rng.uniform(1.2, 2.2)),
-                   label="door")  # fmt: skip
-    if kind in ("fixed", "swing", "tilt", "none"):
+        joint = revolute("body", -UP, (x + thick, -0.97 * half, 0), 0.0, draws.angle("back_angle", (1.2, 2.2)))
+        camera.add("back", leaf, joint, label="door")
+    if kind != "door":
         room = half - y1
         size = min(0.2 * room, 0.08 * height, 0.006)
-        style = pick(rng, {"pad": 0.4, "row": 0.35, "none": 0.25})
+        style = draws.pick("back_controls", {"pad": 0.4, "row": 0.35, "none": 0.25})
         y = 0.5 * (y1 + half)
         if style == "pad" and size > 0.001:
             z = 0.4 * height
@@ -192,75 +210,78 @@ def _back(rng: Rng, camera: Assembly, shell: Shell) -> None:
             button = rod((x + 0.0012, x + 0.0012 + 0.6 * size), y, z, 0.8 * size, sections=14)
             camera.add("button", button, prismatic("body", FRONT, 0.0, 0.001, (x, y, z)))
         elif style == "row" and size > 0.001:
-            for number in range(int(rng.integers(1, 4))):
+            for number in range(draws.integer("back_buttons", 1, 3)):
                 z = height * (0.2 + 0.2 * number)
                 button = rod((x + 0.0012, x + 0.0012 + 0.5 * size), y, z, size, sections=14)
                 camera.add(f"button_{number}", button, prismatic("body", FRONT, 0.0, 0.001, (x, y, z)))
-    if rng.random() < 0.2:  # a door at the right side
+    if draws.chance("side_door", 0.2):  # at the right side
         y, t = half + 0.001, 0.0025
         deep = (0.2 * shell.depth, 0.8 * shell.depth)
         door = box(deep, (y, y + t), (0.2 * height, 0.75 * height), fillet=0.002, axis=1)
-        camera.add("door", door, revolute("body", -UP, (0.8 * shell.depth, y + t, 0), 0.0, rng.uniform(1.0, 2.2)))
+        angle = draws.angle("side_door_angle", (1.0, 2.2))
+        camera.add("door", door, revolute("body", -UP, (0.8 * shell.depth, y + t, 0), 0.0, angle))
 
 
-def _flash(rng: Rng, camera: Assembly, shell: Shell, span: tuple[float, float, float]) -> None:
+def _flash(draws: Draws, camera: Assembly, shell: Shell, span: tuple[float, float, float]) -> None:
     """A flash on the crest: it lies flat and swings up about its back edge, or slides up."""
     y0, y1, z = span
     low = z + GAP
-    tall = shell.height * rng.uniform(0.06, 0.2)
+    tall = shell.height * draws.number("flash_height", (0.06, 0.2))
     x0, x1 = 0.42 * shell.depth, 0.78 * shell.depth
     flash = box((x0, x1), (y0, y1), (low, low + tall), fillet=0.3 * tall)
-    if rng.random() < 0.7:
-        joint = revolute("body", (0, 1, 0), (x1, 0, low), 0.0, rng.uniform(0.5, 1.3))
+    if draws.chance("flash_swings", 0.7):
+        joint = revolute("body", (0, 1, 0), (x1, 0, low), 0.0, draws.angle("flash_angle", (0.5, 1.3)))
     else:
-        joint = prismatic("body", UP, 0.0, tall * rng.uniform(0.5, 1.2), (x1, 0, low))
+        joint = prismatic("body", UP, 0.0, tall * draws.number("flash_travel", (0.5, 1.2)), (x1, 0, low))
     camera.add("flash", flash, joint)
 
 
 # --- other kinds -----------------------------------------------------------------------------------------------------
 
 
-def _camcorder(rng: Rng) -> Assembly:
+def _camcorder(draws: Draws) -> Assembly:
     """A long body with a screen at its left side, a strap at its right, and a viewfinder at the back."""
-    half, height = rng.uniform(0.022, 0.045), rng.uniform(0.05, 0.085)
-    depth = rng.uniform(0.09, 0.2)
-    lens_z = height * rng.uniform(0.5, 0.62)
-    body = box((0, -half, 0), (depth, half, height), fillet=rng.uniform(0.1, 0.6) * half,
-                       axis=[None, 0, 1][int(rng.integers(3))])  # fmt: skip
-    lens = Lens(rng, (0.0, 0.0, lens_z), min(half, 0.38 * height) * 0.92, pick(rng, ["tubes", "prime", "zoom"]))
-    if rng.random() < 0.5:  # a handle on top
-        x0, x1, z = 0.1 * depth, 0.85 * depth, height + rng.uniform(0.02, 0.04)
-        r = rng.uniform(0.004, 0.008)
-        body += tube([(x0, 0, height - 0.004), (x0, 0, z - r), (x0 + r, 0, z), (x1 - r, 0, z), (x1, 0, z - r),
-                      (x1, 0, height - 0.004)], r, 10)  # fmt: skip
-    if rng.random() < 0.6:  # a strap at the right
-        bulge = half + rng.uniform(0.008, 0.02)
+    half, height = 0.5 * draws.length("width", (0.044, 0.09)), draws.length("height", (0.05, 0.085))
+    depth = draws.length("depth", (0.09, 0.2))
+    lens_z = height * draws.number("lens_height", (0.5, 0.62))
+    r = draws.number("edge_radius", (0.1, 0.6)) * half
+    axis = _ROUND[draws.pick("round_edges", ["all", "lengthwise", "crosswise"])]
+    body = box((0, depth), half, (0, height), fillet=r, axis=axis)
+    style = draws.pick("lens", ["tubes", "prime", "zoom"])
+    lens = Lens(draws, (0.0, 0.0, lens_z), min(half, 0.38 * height) * 0.92, style)
+    if draws.chance("handle", 0.5):  # on top
+        x0, x1, z = 0.1 * depth, 0.85 * depth, height + draws.length("handle_height", (0.02, 0.04))
+        r = draws.length("handle_radius", (0.004, 0.008))
+        path = [(x0, height - 0.004), (x0, z - r), (x0 + r, z), (x1 - r, z), (x1, z - r), (x1, height - 0.004)]
+        body += tube([(x, 0, z) for x, z in path], r, 10).called("handle", UP)
+    if draws.chance("strap", 0.6):  # at the right
+        bulge = half + draws.length("strap_bulge", (0.008, 0.02))
         xs = np.linspace(0.15, 0.85, 5) * depth
         ys = [half - 0.003, 0.6 * half + 0.4 * bulge, bulge, 0.6 * half + 0.4 * bulge, half - 0.003]
-        wide = rng.uniform(0.2, 0.35) * height
-        for k in range(4):
-            ends = [box(about(xs[i], 0.001), about(ys[i], 0.001), about(0.5 * height, wide)) for i in (k, k + 1)]
-            body += hull_of(*ends)
-    back = rng.random() < 0.5
-    if back:
-        body += box((depth - 0.004, -0.7 * half, 0.05 * height), (depth + rng.uniform(0.008, 0.03), 0.7 * half,
-                                                                         0.62 * height), fillet=0.004)  # fmt: skip
+        wide = draws.number("strap_width", (0.2, 0.35)) * height
+        links = [box(about(x, 0.001), about(y, 0.001), about(0.5 * height, wide)) for x, y in zip(xs, ys, strict=True)]
+        body += union(hull_of(*ends) for ends in pairwise(links)).called("handle", SIDE)
+    if draws.chance("battery", 0.5):  # at the back
+        deep = (depth - 0.004, depth + draws.length("battery_depth", (0.008, 0.03)))
+        body += box(deep, 0.7 * half, (0.05 * height, 0.62 * height), fillet=0.004)
     camera = Assembly("body", body + lens.fixed, DENSITY)
     lens.add_to(camera)
-    if rng.random() < 0.85:
-        thick = rng.uniform(0.004, 0.009)
+    if draws.chance("screen", 0.85):
+        thick = draws.length("screen_thickness", (0.004, 0.009))
         y = -half - GAP
-        x0, x1 = depth * rng.uniform(0.06, 0.2), depth * rng.uniform(0.65, 0.95)
+        x0, x1 = depth * draws.number("screen_front", (0.06, 0.2)), depth * draws.number("screen_back", (0.65, 0.95))
         screen = box((x0, x1), (y - thick, y), (0.15 * height, 0.88 * height), fillet=0.003, axis=1)
-        camera.add("screen", screen, revolute("body", -UP, (x0, y - thick, 0), 0.0, rng.uniform(1.2, 2.0)))
-    if rng.random() < 0.5:
+        angle = draws.angle("screen_angle", (1.2, 2.0))
+        camera.add("screen", screen, revolute("body", -UP, (x0, y - thick, 0), 0.0, angle))
+    if draws.chance("viewfinder", 0.5):
         z = 0.85 * height
-        r = 0.22 * height * rng.uniform(0.6, 1.0)
-        eye = rod((depth + 0.001 + r, depth + rng.uniform(0.03, 0.06)), 0, z, 0.8 * r, r, 16)
-        eye += rod(depth + 0.001 + r, (-0.6 * half, 0.6 * half), z, r, sections=14)
-        tilt = revolute("body", (0, -1, 0), (depth + 0.001 + r, 0, z), 0.0, rng.uniform(0.4, 1.2))
+        r = 0.22 * height * draws.number("viewfinder_radius", (0.6, 1.0))
+        x = depth + 0.001 + r
+        eye = rod((x, depth + draws.length("viewfinder_length", (0.03, 0.06))), 0, z, 0.8 * r, r, 16)
+        eye += rod(x, (-0.6 * half, 0.6 * half), z, r, sections=14)
+        tilt = revolute("body", (0, -1, 0), (x, 0, z), 0.0, draws.angle("viewfinder_angle", (0.4, 1.2)))
         camera.add("viewfinder", eye, tilt)
-    for number, x in enumerate((0.3, 0.9)[: int(rng.integers(0, 3))]):
+    for number, x in enumerate((0.3, 0.9)[: draws.integer("buttons", 0, 2)]):
         size = 0.25 * half
         at = (x * depth, 0.55 * half, height + GAP)
         button = box(about(at[0], size), about(at[1], 0.6 * size), (at[2] + 0.0012, at[2] + 0.004), fillet=0.001)
@@ -268,42 +289,40 @@ def _camcorder(rng: Rng) -> Assembly:
     return camera
 
 
-def _swivel(rng: Rng) -> Assembly:
+def _swivel(draws: Draws) -> Assembly:
     """A camera that turns and nods in a fork on a foot: for a desk, a wall, a ceiling."""
-    r = rng.uniform(0.02, 0.06)
-    shape = pick(rng, ["ball", "bullet", "box"])
+    r = 0.5 * draws.length("width", (0.04, 0.12))  # of the head
+    shape = draws.pick("head", ["ball", "bullet", "box"])
     thick = 0.14 * r
     reach = r + 0.002
     if shape == "ball":
         head, front, low = ellipsoid((0, 0, 0), r, 20), r, 1.2 * r
-    elif shape == "bullet":
-        long = r * rng.uniform(1.4, 2.6)
-        head = rod((-long, 0.8 * long), 0, 0, r, sections=22)
-        if rng.random() < 0.6:
-            head += box((-1.25 * long, 0.7 * long), 0.9 * r, (0.75 * r, 1.1 * r), fillet=0.1 * r)
-        front, low = long, 1.3 * long + r
     else:
-        long = r * rng.uniform(0.9, 2.0)
-        head = box(long, r, 0.8 * r, fillet=0.2 * r)
+        long = r * draws.number("depth", (1.4, 2.6) if shape == "bullet" else (0.9, 2.0))
         front, low = long, 1.3 * long + r
+        head = box(long, r, 0.8 * r, fillet=0.2 * r)
+    if shape == "bullet":
+        head = rod((-long, 0.8 * long), 0, 0, r, sections=22)
+        if draws.chance("sun_roof", 0.6):
+            head += box((-1.25 * long, 0.7 * long), 0.9 * r, (0.75 * r, 1.1 * r), fillet=0.1 * r)
     head += rod((-0.8 * front, -front - 0.12 * r), 0, 0, 0.6 * r, sections=20)
-    head += ring((-front - 0.18 * r, 0, 0), FRONT, 0.45 * r, 0.6 * r, 0.16 * r, 20)
+    head += ring((-front - 0.18 * r, 0, 0), FRONT, 0.45 * r, 0.6 * r, 0.16 * r, 20).called("glass", FRONT)
     sink = low + thick + 0.004
     fork = tube([(0, -reach - thick, 0), (0, -reach - thick, -0.6 * sink), (0, -0.5 * r, -sink), (0, 0.5 * r, -sink),
                  (0, reach + thick, -0.6 * sink), (0, reach + thick, 0)], thick, 10)  # fmt: skip
     neck = 0.3 * r
     fork += rod(0, 0, (-sink - thick, -sink), 2.2 * thick, sections=14)
     foot = -sink - thick - GAP
-    kind = pick(rng, ["disc", "column", "clip"])
+    kind = draws.pick("foot", ["disc", "column", "clip"])
     if kind == "clip":
         base = box(0.8 * r, r, (foot - 0.01, foot)) + box((0.4 * r, -0.7 * r, foot - 2 * r), (0.6 * r, 0.7 * r, foot))
     else:
-        tall = r * (rng.uniform(0.2, 0.5) if kind == "disc" else rng.uniform(1.0, 3.0))
+        tall = r * draws.number("foot_height", (0.2, 0.5) if kind == "disc" else (1.0, 3.0))
         base = rod(0, 0, (foot - tall, foot), neck if kind == "column" else 1.1 * r, 0.9 * neck + 0.4 * r)
         base += rod(0, 0, (foot - tall - 0.2 * r, foot - tall + 1e-4), 1.3 * r, 1.2 * r)
     camera = Assembly("body", base, DENSITY)
-    pan = rng.uniform(0.8, 3.0) if rng.random() < 0.5 else None
+    pan = draws.angle("pan_angle", (0.8, 3.0)) if draws.chance("pan_stops", 0.5) else None
     camera.add("fork", fork, swivel("body", UP, (0, 0, foot), pan))
-    limit = rng.uniform(0.3, 1.2)
+    limit = draws.angle("nod_angle", (0.3, 1.2))
     camera.add("head", head, revolute("fork", (0, 1, 0), (0, 0, 0), -limit, limit))
     return camera

@@ -1,13 +1,14 @@
 """Keys and buttons on flat faces, and bodies of varying cross-section, as handheld and desktop devices have them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from artsim.common.elementary import cos, sin
-from artsim.making.assembly import Assembly, JointSpec, Rng, pick, prismatic
+from artsim.making.assembly import Assembly, JointSpec, prismatic
+from artsim.making.draws import Draws
 from artsim.making.outlines import Vector, lifted, rounded_rectangle
 from artsim.making.solids import Solid, hull, prism, union
 from artsim.model.kinematics import Array
@@ -86,49 +87,59 @@ def add_key(
     assembly.add(name, solid, press(face, parent, uv[0], uv[1], travel), density=1100.0)
 
 
-def key_cells(
-    u: Sequence[float], v: Sequence[float], columns: int, rows: int
-) -> Iterator[tuple[int, int, float, float]]:
-    """Row, column and centre of each cell of a grid over a rectangle of limits u and v, from its upper left on."""
-    wide, high = (u[1] - u[0]) / columns, (v[1] - v[0]) / rows
-    for row in range(rows):
-        for column in range(columns):
-            yield row, column, u[0] + (column + 0.5) * wide, v[1] - (row + 0.5) * high
-
-
-def add_keypad(
-    rng: Rng, phone: Assembly, parent: str, face: Face, half: float, v: tuple[float, float],
-    height: float,
+def add_buttons(
+    assembly: Assembly, parent: str, face: Face, spots: Iterable[Sequence[float]], outline: Array,
+    height: float, travel: float, shrink: float = 0.1, first: int = 0, label: str = "button",
 ) -> int:  # fmt: skip
-    """Keys in three or four columns over a part of a face, function keys above them; returns the next free number."""
-    kind = pick(rng, ["square", "pill", "round"])
-    columns, rows = (3, 4) if rng.random() < 0.7 else (int(rng.integers(3, 6)), int(rng.integers(2, 5)))
-    fill = rng.uniform(0.6, 0.9, 2)
-    travel = min(rng.uniform(0.0003, 0.0006), height - 0.0008)
-    number, low, high = 0, v[0], v[1]
-    if rng.random() < 0.7:
-        split = high - (high - low) * rng.uniform(0.15, 0.3)
-        number = add_function_keys(rng, phone, parent, face, half, (split, high), height, number)
-        high = split
-    pitch = np.array([2.0 * half / columns, (high - low) / rows])
-    outline = key_outline(kind, np.minimum(fill * pitch, 2.2 * pitch.min()), 10)
-    for _, _, a, b in key_cells((-half, half), (low, high), columns, rows):
-        add_key(phone, parent, f"button_{number}", face, (a, b), outline, height, travel, 0.2)
-        number += 1
+    """Add equal keys at places (u, v), numbered on from ``first``; returns the next free number."""
+    number = first
+    for number, spot in enumerate(spots, first + 1):
+        add_key(assembly, parent, f"{label}_{number - 1}", face, spot, outline, height, travel, shrink)
     return number
 
 
-def add_function_keys(
-    rng: Rng, phone: Assembly, parent: str, face: Face, half: float, v: tuple[float, float], height: float, number: int
+def key_cells(u: Sequence[float], v: Sequence[float], columns: int, rows: int) -> Iterator[tuple[float, float]]:
+    """Centre of each cell of a grid over a rectangle of limits u and v, from its upper left on, row by row."""
+    wide, high = (u[1] - u[0]) / columns, (v[1] - v[0]) / rows
+    for row in range(rows):
+        for column in range(columns):
+            yield u[0] + (column + 0.5) * wide, v[1] - (row + 0.5) * high
+
+
+def add_keypad(
+    draws: Draws, phone: Assembly, parent: str, face: Face, half: float, v: tuple[float, float], height: float
 ) -> int:
+    """Keys in three or four columns over a part of a face, function keys above them; returns the next free number."""
+    kind = draws.pick("key_shape", ["square", "pill", "round"])
+    columns, rows = 3, 4
+    if not draws.chance("twelve_keys", 0.7):
+        columns, rows = draws.integer("key_columns", 3, 5), draws.integer("key_rows", 2, 4)
+    fill = draws.numbers("key_fill", 0.6, 0.9, 2)  # share of a cell that a key takes up, along u and v
+    travel = min(draws.length("key_travel", (0.0003, 0.0006)), height - 0.0008)
+    number, low, high = 0, v[0], v[1]
+    if draws.chance("function_keys", 0.7):
+        split = high - (high - low) * draws.number("function_keys_height", (0.15, 0.3))
+        number = add_function_keys(draws, phone, parent, face, half, (split, high), height, number)
+        high = split
+    pitch = np.array([2.0 * half / columns, (high - low) / rows])
+    outline = key_outline(kind, np.minimum(fill * pitch, 2.2 * pitch.min()), 10)
+    spots = key_cells((-half, half), (low, high), columns, rows)
+    return add_buttons(phone, parent, face, spots, outline, height, travel, 0.2, number)
+
+
+def add_function_keys(
+    draws: Draws, phone: Assembly, parent: str, face: Face, half: float, v: tuple[float, float], height: float,
+    number: int,
+) -> int:  # fmt: skip
     """Two keys with a larger one between them; returns the next free number."""
-    travel, deep, middle = 0.0003, v[1] - v[0], 0.5 * (v[0] + v[1])
-    wide = 0.5 * half
-    big = key_outline(pick(rng, ["round", "pill", "square"]), (min(0.8 * half, 1.4 * deep), 0.85 * deep), 14)
-    small = key_outline(pick(rng, ["round", "pill", "square"]), (0.8 * wide, 0.5 * deep), 10)
-    for u, outline in ((-0.75 * half, small), (0.0, big), (0.75 * half, small)):
-        add_key(phone, parent, f"button_{number}", face, (u, middle), outline, height, travel, 0.15)
-        number += 1
+    deep, middle = v[1] - v[0], 0.5 * (v[0] + v[1])
+    sizes = {"select_key": (min(0.8 * half, 1.4 * deep), 0.85 * deep), "function_key": (0.4 * half, 0.5 * deep)}
+    big, small = (
+        key_outline(draws.pick(f"{name}_shape", ["round", "pill", "square"]), size, 14 if name == "select_key" else 10)
+        for name, size in sizes.items()
+    )
+    for u, outline in ((-0.75, small), (0.0, big), (0.75, small)):
+        number = add_buttons(phone, parent, face, [(u * half, middle)], outline, height, 0.0003, 0.15, number)
     return number
 
 

@@ -3,7 +3,8 @@
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, Vector, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, ring
 
@@ -17,109 +18,101 @@ class Lens:
     that slide in a collar), "prime" (rings that turn), or "zoom" (both).
     """
 
-    def __init__(self, rng: Rng, center: Vector, radius: float, style: str):
+    def __init__(self, draws: Draws, center: Vector, radius: float, style: str):
         self.center = np.asarray(center, dtype=np.float64)
         self.fixed = Solid()
         self.parts: list[tuple[str, Solid, JointSpec]] = []
         if style == "tubes":
-            long = radius * rng.uniform(0.25, 0.8)
-            count = int(rng.integers(1, 4))
-            self._tubes(rng, radius, 0.0, long, count)
+            long = radius * draws.number("lens_length", (0.25, 0.8))
+            count = draws.integer("tube_count", 1, 3)
+            wall = 0.1 * radius
+            self._pipe(radius, radius - wall, 0.0, long)
+            if draws.chance("lens_collar", 0.6):
+                self._pipe(1.15 * radius if radius < 0.02 else radius * 1.05, radius - wall, -0.001, 0.35 * long)
+            self._sliding(draws, radius - wall - 0.0006, 0.0, long, count)
             return
-        long = radius * (rng.uniform(0.5, 1.4) if style == "prime" else rng.uniform(1.0, 3.0))
-        radius *= rng.uniform(0.75, 1.0)
+        long = radius * draws.number("lens_length", (0.5, 1.4) if style == "prime" else (1.0, 3.0))
+        radius *= draws.number("lens_width", (0.75, 1.0))
         core = 0.86 * radius
         self.fixed += cylinder(self.center + (0.001, 0, 0), self.center - (0.12 * long, 0, 0), radius, sections=28)
-        slots = [(0.18, 0.4), (0.5, 0.8)] if rng.random() < 0.6 else [(0.3, 0.75)]
+        slots = [(0.18, 0.4), (0.5, 0.8)] if draws.chance("zoom_ring", 0.6) else [(0.3, 0.75)]
         hollow = style == "zoom"
         bore = 0.72 * radius
+        hole = bore if hollow else 0.5 * core
         if hollow:
             self._pipe(core, bore, 0.0, long)
         else:
             self.fixed += cylinder(self.center, self.center - (long, 0, 0), core, sections=28)
-            self._glass(core, long)
-        self.fixed += ring(
-            self.center - (0.95 * long, 0, 0), FRONT, bore if hollow else 0.5 * core, radius, 0.1 * long, 24
-        )
+            rim = self.center - (long + 0.03 * core, 0, 0)
+            self.fixed += ring(rim, FRONT, 0.8 * core, core, 0.08 * core, 24)
+            self.fixed += self._glass(core, 0.7, long, 16)
+        self.fixed += ring(self.center - (0.95 * long, 0, 0), FRONT, hole, radius, 0.1 * long, 24)
         if len(slots) == 2:
-            self.fixed += ring(self.center - (0.45 * long, 0, 0), FRONT, bore if hollow else 0.5 * core, radius,
-                               0.06 * long, 24)  # fmt: skip
+            self.fixed += ring(self.center - (0.45 * long, 0, 0), FRONT, hole, radius, 0.06 * long, 24)
         for number, (a, b) in enumerate(slots):
-            wall = radius * rng.uniform(1.0, 1.08)
+            name = "focus_ring" if number == len(slots) - 1 else "zoom_ring"
+            wall = radius * draws.number(f"{name}_width", (1.0, 1.08))
             grip = ring(
                 self.center - (0.5 * (a + b) * long, 0, 0), FRONT, 1.004 * core + 0.0006, wall, (b - a) * long, 20
             )
-            grip += self._ribs(rng, wall, a * long, b * long)
+            for angle in turns(draws.pick(f"{name}_ribs", [0, 6, 10])):
+                out = self.center + (0, wall * cos(angle), wall * sin(angle))
+                inset = 0.15 * (b * long - a * long)
+                ends = out - (a * long + inset, 0, 0), out - (b * long - inset, 0, 0)
+                grip += cylinder(*ends, 0.06 * wall, sections=4)
             turn = continuous("body", FRONT, self.center)
-            if rng.random() < 0.5:
-                turn = revolute("body", FRONT, self.center, 0.0, rng.uniform(0.8, 4.5))
-            name = "focus_ring" if number == len(slots) - 1 else "zoom_ring"
+            if draws.chance(f"{name}_stops", 0.5):
+                turn = revolute("body", FRONT, self.center, 0.0, draws.angle(f"{name}_angle", (0.8, 4.5)))
             self.parts.append((name, grip, turn))
         if hollow:
-            self._sliding(rng, bore - 0.0008, 0.12 * long, long, int(rng.integers(1, 3)))
-
-    def _ribs(self, rng: Rng, radius: float, near: float, far: float) -> Solid:
-        solid = Solid()
-        count = int(rng.choice([0, 6, 10]))
-        for a in turns(count):
-            out = self.center + (0, radius * cos(a), radius * sin(a))
-            inset = 0.15 * (far - near)
-            solid += cylinder(out - (near + inset, 0, 0), out - (far - inset, 0, 0), 0.06 * radius, sections=4)
-        return solid
+            self._sliding(draws, bore - 0.0008, 0.12 * long, long, draws.integer("tube_count", 1, 2))
 
     def _pipe(self, radius: float, bore: float, near: float, far: float) -> None:
         self.fixed += ring(self.center - (0.5 * (near + far), 0, 0), FRONT, bore, radius, far - near, 24)
 
-    def _glass(self, radius: float, front: float) -> None:
-        """The rim of the front glass, whose dome stands a little out."""
-        self.fixed += ring(self.center - (front + 0.03 * radius, 0, 0), FRONT, 0.8 * radius, radius, 0.08 * radius, 24)
-        self.fixed += ellipsoid(self.center - (front, 0, 0), (0.06 * radius, 0.7 * radius, 0.7 * radius), 16)
+    def _glass(self, radius: float, share: float, front: float, sections: int) -> Solid:
+        """The front glass, ``share`` of a radius wide; its dome stands a little out."""
+        sizes = 0.06 * radius, share * radius, share * radius
+        return ellipsoid(self.center - (front, 0, 0), sizes, sections).called("glass", FRONT)
 
-    def _tubes(self, rng: Rng, radius: float, near: float, long: float, count: int) -> None:
-        wall = 0.1 * radius
-        self._pipe(radius, radius - wall, near, long)
-        if rng.random() < 0.6:
-            self._pipe(1.15 * radius if radius < 0.02 else radius * 1.05, radius - wall, near - 0.001, 0.35 * long)
-        self._sliding(rng, radius - wall - 0.0006, 0.0, long, count)
-
-    def _sliding(self, rng: Rng, radius: float, near: float, long: float, count: int) -> None:
+    def _sliding(self, draws: Draws, radius: float, near: float, long: float, count: int) -> None:
         """Tubes in each other, the first in a bore from ``near`` to ``long`` before the body's front."""
         parent, outer = "body", long
         for k in range(count):
             last = k == count - 1
-            start, front = near + 0.0015 + 0.0008 * k, outer + rng.uniform(-0.05, 0.25) * long
+            start, front = near + 0.0015 + 0.0008 * k, outer + draws.number("tube_length", (-0.05, 0.25)) * long
             wall = 0.12 * radius
             if last:
                 solid = cylinder(self.center - (start, 0, 0), self.center - (front, 0, 0), radius, sections=24)
                 solid += ring(self.center - (front + 0.02 * radius, 0, 0), FRONT, 0.75 * radius, 0.97 * radius,
                               0.06 * radius, 20)  # fmt: skip
-                solid += ellipsoid(self.center - (front, 0, 0), (0.06 * radius, 0.6 * radius, 0.6 * radius), 14)
+                solid += self._glass(radius, 0.6, front, 14)
             else:
                 solid = ring(
                     self.center - (0.5 * (start + front), 0, 0), FRONT, radius - wall, radius, front - start, 22
                 )
-            travel = (min(front, outer) - start) * rng.uniform(0.5, 0.9)
+            travel = (min(front, outer) - start) * draws.number("tube_travel", (0.5, 0.9))
             at = self.center - (front, 0, 0)
-            turning = last and k > 0 and rng.random() < 0.25
+            turning = last and k > 0 and draws.chance("last_tube_turns", 0.25)
             joint = continuous(parent, FRONT, at) if turning else prismatic(parent, FRONT, 0.0, travel, at)
             part = "lens" if k == 0 else f"lens_{k}"
             self.parts.append((part, solid, joint))
-            if last and rng.random() < 0.25:
-                self._cap(rng, part, radius, max(front + 0.06 * radius, long))
+            if last and draws.chance("cap", 0.25):
+                self._cap(draws, part, radius, max(front + 0.06 * radius, long))
             parent, outer, radius = part, front, radius - wall - 0.0006
 
-    def _cap(self, rng: Rng, parent: str, radius: float, front: float) -> None:
+    def _cap(self, draws: Draws, parent: str, radius: float, front: float) -> None:
         """A lid before the glass: it pulls off, or swings aside."""
         thick = 0.12 * radius
         near = self.center - (front + 0.0006, 0, 0)
         lid = cylinder(near, near - (thick, 0, 0), 0.98 * radius, 0.9 * radius, 22)
-        if rng.random() < 0.5:
-            joint = prismatic(parent, FRONT, 0.0, radius * rng.uniform(0.3, 1.5), near)
+        if draws.chance("cap_pulls_off", 0.5):
+            joint = prismatic(parent, FRONT, 0.0, radius * draws.number("cap_travel", (0.3, 1.5)), near)
         else:
             pivot = near + (-thick, 0, 1.02 * radius)
             lid += cylinder(pivot - (0, 0.2 * radius, 0), pivot + (0, 0.2 * radius, 0), 0.5 * thick, sections=10)
             lid += box(near + (-thick, -0.2 * radius, 0.7 * radius), near + (0, 0.2 * radius, 1.02 * radius))
-            joint = revolute(parent, (0, 1, 0), pivot, 0.0, rng.uniform(1.0, 1.9))
+            joint = revolute(parent, (0, 1, 0), pivot, 0.0, draws.angle("cap_angle", (1.0, 1.9)))
         self.parts.append(("cap", lid, joint))
 
     def add_to(self, camera: Assembly) -> None:

@@ -9,146 +9,155 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from artsim.common.elementary import exp
 from artsim.families.desk_phone import desk_set
+from artsim.families.details import drawn_side
 from artsim.families.keys import Face, add_function_keys, add_key, add_keypad, cross_sections, front_face, key_outline
-from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
-from artsim.making.outlines import about, lifted
+from artsim.making.assembly import Assembly, prismatic, revolute
+from artsim.making.draws import Draws
+from artsim.making.outlines import FRONT, about, lifted
 from artsim.making.solids import Solid, box, hull, loft, rod, union
 
 GAP = 0.0005
-UNDER_LID = (0.001, 0.0016)
-"""How far keys under a lid stand out, metres."""
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """A telephone; closed, its handset in place and no key pressed at rest."""
-    kinds = {_bar: 0.15, _flip: 0.17, _slider: 0.12, _swivel: 0.07, _fold: 0.08, _smartphone: 0.1, _cordless: 0.11,
-             desk_set: 0.2}  # fmt: skip
+    kinds = {"bar": 0.15, "flip": 0.17, "slider": 0.12, "swivel": 0.07, "fold": 0.08, "smartphone": 0.1,
+             "cordless": 0.11, "desk": 0.2}  # fmt: skip
     phone = Assembly(density=1300.0)
-    pick(rng, kinds)(rng, phone)
+    {"bar": _bar, "flip": _flip, "slider": _slider, "swivel": _swivel, "fold": _fold, "smartphone": _smartphone,
+     "cordless": _cordless, "desk": desk_set}[draws.pick("kind", kinds)](draws, phone)  # fmt: skip
     return phone
 
 
-def _slab(rng: Rng, half: float, x: tuple[float, float], z: tuple[float, float], curve: int = 0) -> Solid:
+def _slab(draws: Draws, half: float, x: tuple[float, float], z: tuple[float, float], curve: int = 0) -> Solid:
     """Upright plate with round edges; where ``curve`` is 1 its back (+X) bulges, where it is -1 its front does."""
     levels = np.array([0.0, 0.03, 0.2, 0.5, 0.8, 0.97, 1.0])
-    corner = rng.uniform(0.0, 0.35) * np.array([1.0, 0.3, 0.0, 0.0, 0.0, 0.3, 1.0])
-    waist = rng.uniform(-0.12, 0.12) * rng.choice([0.0, 1.0]) * np.array([0.0, 0.05, 0.6, 1.0, 0.6, 0.05, 0.0])
-    thick = x[1] - x[0]
-    bow = rng.uniform(0.1, 0.7) * thick * rng.choice([0.0, 1.0])
-    bow = bow * np.array([1.0, 0.9, 0.4, rng.uniform(0.0, 0.3), 0.4, 0.9, 1.0])
+    corner = draws.number("corner", (0.0, 0.35)) * np.array([1.0, 0.3, 0.0, 0.0, 0.0, 0.3, 1.0])
+    waist = draws.number("waist", (-0.12, 0.12)) * draws.pick("waisted", [False, True])
+    waist = waist * np.array([0.0, 0.05, 0.6, 1.0, 0.6, 0.05, 0.0])
+    bow = draws.number("bow", (0.1, 0.7)) * (x[1] - x[0]) * draws.pick("bowed", [False, True])
+    bow = bow * np.array([1.0, 0.9, 0.4, draws.number("bow_hollow", (0.0, 0.3)), 0.4, 0.9, 1.0])
     fronts, backs = np.full(7, x[0]), np.full(7, x[1])
     if curve > 0:
         backs = backs - bow
     elif curve < 0:
         fronts = fronts + bow
     halves = half * (1.0 - corner - np.abs(waist))
-    return loft(cross_sections(z[0] + levels * (z[1] - z[0]), fronts, backs, halves, rng.uniform(0.1, 0.8)))
+    roundness = draws.number("roundness", (0.1, 0.8))
+    return loft(cross_sections(z[0] + levels * (z[1] - z[0]), fronts, backs, halves, roundness))
 
 
-def _side_keys(rng: Rng, phone: Assembly, half: float, x: float, z: tuple[float, float],
+def _side_keys(draws: Draws, phone: Assembly, half: float, x: float, z: tuple[float, float],
                thick: float, sides: Sequence[float] = (-1.0, 1.0)) -> None:  # fmt: skip
     """Keys on the right (-1) and left (1) edges of an upright body."""
     for side in sides:
         face = Face(np.array([x, side * half, 0.0]), np.array([-side, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
-        for k in range(int(rng.integers(0, 3))):
+        name = "left_key" if side > 0 else "right_key"
+        for k in range(draws.integer(f"{name}s", 0, 2)):
             v = z[0] + (0.62 + 0.14 * k) * (z[1] - z[0])
-            outline = key_outline("pill", (0.3 * thick, rng.uniform(0.05, 0.11) * (z[1] - z[0])), 8)
-            name = f"{'left' if side > 0 else 'right'}_key_{k}"
-            add_key(phone, "body", name, face, (0.0, v), outline, 0.0014, 0.0004)
+            long = draws.number(f"{name}_length", (0.05, 0.11)) * (z[1] - z[0])
+            outline = key_outline("pill", (0.3 * thick, long), 8)
+            add_key(phone, "body", f"{name}_{k}", face, (0.0, v), outline, 0.0014, 0.0004)
 
 
-def _size(rng: Rng) -> tuple[float, float, float]:
-    """Length, half of the width and thickness of a mobile phone."""
-    length = 0.12 * exp(rng.uniform(-0.45, 0.7))
-    half = 0.5 * length * rng.triangular(0.28, 0.45, 0.72)
-    return length, half, length * rng.triangular(0.06, 0.13, 0.36)
+def _size(draws: Draws) -> tuple[float, float, float]:
+    """Length, half of the width and thickness of a mobile phone; the draws of the last two are over the length."""
+    length = draws.log_length("height", 0.12, -0.45, 0.7)
+    half = 0.5 * length * draws.triangular("width", 0.28, 0.45, 0.72)
+    return length, half, length * draws.triangular("depth", 0.06, 0.13, 0.36)
 
 
-def _aerial(rng: Rng, phone: Assembly, half: float, x: float, length: float, thick: float) -> None:
+def _halves(draws: Draws, base: tuple[float, float]) -> tuple[float, float, float, float, float, float]:
+    """Measures of a phone of two halves, one on the other; ``base`` is the lower one's share of the thickness.
+
+    Length, half of the width, thickness of the lower and of the upper half, how far keys stand out, and x of the upper
+    half's back.
+    """
+    length, half, thick = _size(draws)
+    lower = thick * draws.number("base_thickness", base)
+    height = draws.length("key_height", (0.001, 0.0016))  # of keys under a lid
+    return length, half, lower, thick - lower, height, -height - GAP
+
+
+def _aerial(draws: Draws, phone: Assembly, half: float, x: float, length: float, thick: float) -> None:
     """A rod along one side that swings up about its upper end, on some."""
-    if rng.random() < 0.55:
+    if not draws.chance("antenna", 0.45, upper=True):
         return
-    radius = min(rng.uniform(0.0015, 0.004), 0.4 * thick)
-    side = float(rng.choice([-1.0, 1.0]))
+    radius = min(draws.length("antenna_radius", (0.0015, 0.004)), 0.4 * thick)
+    side = drawn_side(draws, "antenna_side")
     y, z = side * (half + radius + 0.002), 0.93 * length  # clear of keys on the edge
-    stalk = rod(x, y, (z, z - length * rng.uniform(0.4, 0.85)), radius, sections=12)
+    stalk = rod(x, y, (z, z - length * draws.number("antenna_length", (0.4, 0.85))), radius, sections=12)
     stalk += rod(x, (y - side * radius, y + 0.5 * side * radius), z, 1.4 * radius, sections=14)
-    turn = revolute("body", (0, float(rng.choice([-1.0, 1.0])), 0), (x, y, z), 0.0, rng.uniform(1.6, 3.14))
+    way = {"back": -1.0, "front": 1.0}[draws.pick("antenna_way", ["back", "front"])]
+    turn = revolute("body", (0, way, 0), (x, y, z), 0.0, draws.angle("antenna_angle", (1.6, 3.14)))
     phone.add("antenna", stalk, turn, density=2000.0)
 
 
-def _stand(rng: Rng, phone: Assembly, half: float, x: float, length: float) -> None:
+def _stand(draws: Draws, phone: Assembly, half: float, x: float, length: float) -> None:
     """A leaf on the back that folds out, on some."""
-    if rng.random() < 0.55:
+    if not draws.chance("stand", 0.45, upper=True):
         return
-    thick, z = 0.0015, length * rng.uniform(0.4, 0.65)
-    wide, low = half * rng.uniform(0.3, 0.8), length * rng.uniform(0.03, 0.2)
+    thick, z = 0.0015, length * draws.number("stand_top", (0.4, 0.65))
+    wide, low = half * draws.number("stand_width", (0.3, 0.8)), length * draws.number("stand_bottom", (0.03, 0.2))
     leaf = box((x + GAP, x + GAP + thick), wide, (low, z), fillet=0.004, axis=0, steps=2)
-    phone.add("stand", leaf, revolute("body", (0, -1, 0), (x + GAP, 0, z), 0.0, rng.uniform(0.5, 1.5)), density=1500.0)
+    hinge = revolute("body", (0, -1, 0), (x + GAP, 0, z), 0.0, draws.angle("stand_angle", (0.5, 1.5)))
+    phone.add("stand", leaf, hinge, density=1500.0)
 
 
-def _bar(rng: Rng, phone: Assembly) -> None:
+def _bar(draws: Draws, phone: Assembly) -> None:
     """One piece with keys below a display."""
-    length, half, thick = _size(rng)
-    body = _slab(rng, half, (0.0, thick), (0.0, length), 1)
-    split = length * rng.uniform(0.42, 0.68)
+    length, half, thick = _size(draws)
+    body = _slab(draws.within("base"), half, (0.0, thick), (0.0, length), 1)
+    split = length * draws.number("keypad_top", (0.42, 0.68))
     inner = 0.72 * half
-    body += box((-0.0006, 0.001), inner, (split + 0.04 * length, 0.9 * length))
-    if rng.random() < 0.35:  # a stub of an antenna
-        y, top = rng.choice([-0.6, 0.6]) * half, length * rng.uniform(1.08, 1.35)
+    body += box((-0.0006, 0.001), inner, (split + 0.04 * length, 0.9 * length)).called("display", FRONT)
+    if draws.chance("stub", 0.35):  # of an antenna
+        y, top = 0.6 * drawn_side(draws, "stub_side") * half, length * draws.number("stub_top", (1.08, 1.35))
         body += rod(0.5 * thick, y, (0.9 * length, top), 0.3 * thick, 0.22 * thick, 12)
     phone.add("body", body)
-    height = rng.uniform(0.0011, 0.0026)
-    add_keypad(rng, phone, "body", front_face(0.0), inner, (0.1 * length, split), height)
-    _side_keys(rng, phone, half, 0.5 * thick, (0.0, length), thick)
-    _aerial(rng, phone, half, 0.5 * thick, length, thick)
-    _stand(rng, phone, half, thick, length)
+    height = draws.length("key_height", (0.0011, 0.0026))
+    add_keypad(draws, phone, "body", front_face(0.0), inner, (0.1 * length, split), height)
+    _side_keys(draws, phone, half, 0.5 * thick, (0.0, length), thick)
+    _aerial(draws, phone, half, 0.5 * thick, length, thick)
+    _stand(draws, phone, half, thick, length)
 
 
-def _flip(rng: Rng, phone: Assembly) -> None:
+def _flip(draws: Draws, phone: Assembly) -> None:
     """A lid with the display before the keys, hinged at the top (or, at times, half-way up)."""
-    length, half, thick = _size(rng)
+    length, half, lower, upper, height, plane = _halves(draws, (0.45, 0.65))  # the hinge's axis lies in the plane
     length *= 0.8
-    lower = thick * rng.uniform(0.45, 0.65)
-    upper = thick - lower
-    height = rng.uniform(*UNDER_LID)
-    plane = -height - GAP  # the hinge's axis lies in the back of the lid
     radius = 0.45 * min(upper, lower) + 0.001
-    top = length * rng.uniform(0.72, 1.0)
+    top = length * draws.number("hinge_height", (0.72, 1.0))
     pivot = top - radius - GAP
-    span = half * rng.uniform(0.35, 0.7)
-    body = _slab(rng, half, (0.0, lower), (0.0, top - 2.0 * radius - 2.0 * GAP), 1)
+    span = half * draws.number("hinge_width", (0.35, 0.7))
+    body = _slab(draws.within("base"), half, (0.0, lower), (0.0, top - 2.0 * radius - 2.0 * GAP), 1)
     knuckle = plane + radius
     for s in (-1.0, 1.0):
         first, last = sorted((s * (span + GAP), s * half * 0.98))
         body += rod(plane, (first, last), pivot, radius, sections=16)
         body += box((plane + 0.0003, max(lower * 0.5, knuckle)), (first, last), (top - 4.0 * radius, pivot))
     phone.add("body", body)
-    bottom = rng.uniform(0.0, 0.45) * top if rng.random() < 0.3 else 0.0
-    lid = _slab(rng, half, (plane - upper, plane), (bottom, pivot - radius - GAP), -1)
+    bottom = draws.number("lid_bottom", (0.0, 0.45)) * top if draws.chance("short_lid", 0.3) else 0.0
+    lid = _slab(draws.within("lid"), half, (plane - upper, plane), (bottom, pivot - radius - GAP), -1)
     lid += rod(plane, (GAP - span, span - GAP), pivot, radius * 0.9, sections=16)
     lid += box((plane - min(upper, radius), plane), span - GAP, (pivot - 4.0 * radius, pivot))
-    if rng.random() < 0.6:  # a small display on the outside
-        z = bottom + rng.uniform(0.45, 0.7) * (pivot - bottom)
+    if draws.chance("outer_display", 0.6):
+        z = bottom + draws.number("outer_display_height", (0.45, 0.7)) * (pivot - bottom)
         size = 0.45 * half
         deep = (plane - upper - 0.0008, plane - 0.5 * upper)
-        lid += box(deep, size, about(z, size), fillet=0.3 * size, axis=0, steps=2)
-    phone.add("lid", lid, revolute("body", (0, 1, 0), (plane, 0, pivot), 0.0, rng.uniform(1.6, 2.9)))
-    add_keypad(rng, phone, "body", front_face(0.0), 0.8 * half, (0.08 * top, 0.78 * (top - 4.0 * radius)), height)
-    _side_keys(rng, phone, half, 0.5 * lower, (0.0, top - 4.0 * radius), lower)
+        lid += box(deep, size, about(z, size), fillet=0.3 * size, axis=0, steps=2).called("display", FRONT)
+    phone.add("lid", lid, revolute("body", (0, 1, 0), (plane, 0, pivot), 0.0, draws.angle("lid_angle", (1.6, 2.9))))
+    add_keypad(draws, phone, "body", front_face(0.0), 0.8 * half, (0.08 * top, 0.78 * (top - 4.0 * radius)), height)
+    _side_keys(draws, phone, half, 0.5 * lower, (0.0, top - 4.0 * radius), lower)
 
 
-def _slider(rng: Rng, phone: Assembly) -> None:
+def _slider(draws: Draws, phone: Assembly) -> None:
     """The half with the display slides off the keys, up or to the side."""
-    length, half, thick = _size(rng)
-    lower = thick * rng.uniform(0.4, 0.65)
-    height = rng.uniform(*UNDER_LID)
-    plane = -height - GAP
-    body = _slab(rng, half, (0.0, lower), (0.0, length), 1)
-    sideways = rng.random() < 0.3
-    travel = (half if sideways else 0.5 * length) * rng.uniform(0.7, 0.95)
+    length, half, lower, upper, height, plane = _halves(draws, (0.4, 0.65))
+    body = _slab(draws.within("base"), half, (0.0, lower), (0.0, length), 1)
+    sideways = draws.chance("slides_sideways", 0.3)
+    travel = (half if sideways else 0.5 * length) * draws.number("lid_travel", (0.7, 0.95))
     runner = plane + GAP, 0.001
     if sideways:
         body += union(box(runner, 0.5 * half, (z, z + 0.03 * length)) for z in (0.02 * length, 0.95 * length))
@@ -158,43 +167,39 @@ def _slider(rng: Rng, phone: Assembly) -> None:
         body += union(box(runner, about(s * 0.7 * half, 0.05 * half), upright) for s in (-1, 1))
         keys = (0.06 * length, 0.47 * length)
     phone.add("body", body)
-    upper = thick - lower
-    lid = _slab(rng, half, (plane - upper, plane), (0.0, length), -1)
-    lid += box((plane - upper - 0.0005, plane - 0.5 * upper), 0.75 * half, (0.35 * length, 0.88 * length))
-    axis = (0, float(rng.choice([-1.0, 1.0])), 0) if sideways else (0, 0, 1)
+    lid = _slab(draws.within("lid"), half, (plane - upper, plane), (0.0, length), -1)
+    pane = box((plane - upper - 0.0005, plane - 0.5 * upper), 0.75 * half, (0.35 * length, 0.88 * length))
+    lid += pane.called("display", FRONT)
+    axis = (0, drawn_side(draws, "slide_side"), 0) if sideways else (0, 0, 1)
     phone.add("lid", lid, prismatic("body", axis, 0.0, travel, (plane, 0, 0)))
-    number = add_keypad(rng, phone, "body", front_face(0.0), 0.78 * half, keys, height)
-    front = front_face(plane - upper)
-    add_function_keys(rng, phone, "lid", front, 0.7 * half, (0.08 * length, 0.24 * length), 0.0014, number)
-    _side_keys(rng, phone, half, 0.5 * lower, (0.0, length), lower)
+    number = add_keypad(draws, phone, "body", front_face(0.0), 0.78 * half, keys, height)
+    front, below = front_face(plane - upper), (0.08 * length, 0.24 * length)
+    add_function_keys(draws.within("lid"), phone, "lid", front, 0.7 * half, below, 0.0014, number)
+    _side_keys(draws, phone, half, 0.5 * lower, (0.0, length), lower)
 
 
-def _swivel(rng: Rng, phone: Assembly) -> None:
+def _swivel(draws: Draws, phone: Assembly) -> None:
     """The half with the display turns off the keys in its own plane."""
-    length, half, thick = _size(rng)
-    lower = thick * rng.uniform(0.4, 0.6)
-    height = rng.uniform(*UNDER_LID)
-    plane = -height - GAP
-    pivot = length - half * rng.uniform(0.8, 1.0)
-    body = _slab(rng, half, (0.0, lower), (0.0, length), 1)
+    length, half, lower, upper, height, plane = _halves(draws, (0.4, 0.6))
+    pivot = length - half * draws.number("pivot_inset", (0.8, 1.0))
+    body = _slab(draws.within("base"), half, (0.0, lower), (0.0, length), 1)
     body += rod((plane + GAP, 0.001), 0, pivot, 0.7 * half, sections=20)
     phone.add("body", body)
-    upper = thick - lower
-    lid = _slab(rng, half, (plane - upper, plane), (0.0, length), -1)
+    lid = _slab(draws.within("lid"), half, (plane - upper, plane), (0.0, length), -1)
     lid += rod((plane - upper - 0.0006, plane), 0, pivot, 0.5 * half, sections=20)
-    side = float(rng.choice([-1.0, 1.0]))
-    phone.add("lid", lid, revolute("body", (side, 0, 0), (plane, 0, pivot), 0.0, rng.uniform(1.57, 3.2)))
-    add_keypad(rng, phone, "body", front_face(0.0), 0.78 * half, (0.06 * length, pivot - 0.75 * half), height)
-    _side_keys(rng, phone, half, 0.5 * lower, (0.0, length), lower)
+    hinge = (drawn_side(draws, "lid_side"), 0, 0), (plane, 0, pivot)
+    phone.add("lid", lid, revolute("body", *hinge, 0.0, draws.angle("lid_angle", (1.57, 3.2))))
+    add_keypad(draws, phone, "body", front_face(0.0), 0.78 * half, (0.06 * length, pivot - 0.75 * half), height)
+    _side_keys(draws, phone, half, 0.5 * lower, (0.0, length), lower)
 
 
-def _fold(rng: Rng, phone: Assembly) -> None:
+def _fold(draws: Draws, phone: Assembly) -> None:
     """Two halves like a book's covers, hinged at one side."""
-    length, half, thick = _size(rng)
-    side = float(rng.choice([-1.0, 1.0]))
-    leaf, gap = 0.5 * thick, rng.uniform(0.0008, 0.003)
+    length, half, thick = _size(draws)
+    side = drawn_side(draws, "hinge_side")
+    leaf, gap = 0.5 * thick, draws.length("leaf_gap", (0.0008, 0.003))
     radius = 0.6 * leaf
-    body = _slab(rng, half, (0.5 * gap, leaf), (0.0, length), 1)
+    body = _slab(draws.within("base"), half, (0.5 * gap, leaf), (0.0, length), 1)
     y = side * (half + radius + GAP)
     first = np.linspace(0.03, 0.97, 6) * length
     reach = side * 0.5 * half, y
@@ -202,48 +207,50 @@ def _fold(rng: Rng, phone: Assembly) -> None:
         body += rod(0, y, (low, high), radius, sections=16)
         body += box((0.5 * gap, 0.5 * gap + 0.5 * (leaf - 0.5 * gap)), reach, (low, high))
     bump = (leaf - 0.0005, leaf + 0.0016), (-0.6 * half, 0.1 * half), (0.7 * length, 0.95 * length)
-    body += box(*bump, fillet=0.3 * half, axis=0, steps=2)
+    body += box(*bump, fillet=0.3 * half, axis=0, steps=2).called("glass", -FRONT)  # of the cameras
     phone.add("body", body, density=1500.0)
-    lid = _slab(rng, half, (-leaf, -0.5 * gap), (0.0, length), -1)
+    lid = _slab(draws.within("lid"), half, (-leaf, -0.5 * gap), (0.0, length), -1)
     lid += rod(0, y, (first[1] + GAP, first[4] - GAP), radius, sections=16)
     lid += box((-0.5 * leaf - 0.25 * gap, -0.5 * gap), reach, (first[1] + GAP, first[4] - GAP))
-    phone.add("lid", lid, revolute("body", (0, 0, -side), (0, y, 0), 0.0, rng.uniform(1.6, 3.1)), density=1500.0)
-    _side_keys(rng, phone, half, 0.5 * leaf + 0.25 * gap, (0.0, length), leaf, (-side,))
+    hinge = revolute("body", (0, 0, -side), (0, y, 0), 0.0, draws.angle("lid_angle", (1.6, 3.1)))
+    phone.add("lid", lid, hinge, density=1500.0)
+    _side_keys(draws, phone, half, 0.5 * leaf + 0.25 * gap, (0.0, length), leaf, (-side,))
 
 
-def _smartphone(rng: Rng, phone: Assembly) -> None:
+def _smartphone(draws: Draws, phone: Assembly) -> None:
     """A display with keys on the edges, at times below it, and a camera on the back."""
-    length, half, thick = _size(rng)
+    length, half, thick = _size(draws)
     length, thick = 1.25 * length, max(0.7 * thick, 0.006)
-    body = _slab(rng, half, (0.0, thick), (0.0, length), 1)
-    chin, brow = rng.uniform(0.02, 0.2), rng.uniform(0.02, 0.14)
-    body += box((-0.0005, 0.001), 0.92 * half, (chin * length, (1.0 - brow) * length))
-    if rng.random() < 0.7:  # the camera's bump
-        bump, size = rng.uniform(0.0008, 0.004), rng.uniform(0.15, 0.45) * half
-        y, z = rng.choice([0.0, 0.45]) * half, 0.88 * length - size
-        body += box((0.5 * thick, thick + bump), about(y, size), about(z, size), fillet=0.5 * size, axis=0, steps=2)
+    body = _slab(draws.within("base"), half, (0.0, thick), (0.0, length), 1)
+    chin, brow = draws.number("chin", (0.02, 0.2)), draws.number("brow", (0.02, 0.14))
+    body += box((-0.0005, 0.001), 0.92 * half, (chin * length, (1.0 - brow) * length)).called("display", FRONT)
+    if draws.chance("camera", 0.7):  # its bump
+        deep = (0.5 * thick, thick + draws.length("camera_height", (0.0008, 0.004)))
+        size = draws.number("camera_width", (0.15, 0.45)) * half
+        y = {"middle": 0.0, "side": 0.45}[draws.pick("camera_place", ["middle", "side"])] * half
+        bump = box(deep, about(y, size), about(0.88 * length - size, size), fillet=0.5 * size, axis=0, steps=2)
+        body += bump.called("glass", -FRONT)
     phone.add("body", body, density=1800.0)
     if chin > 0.1:
         upright = 0.02 * length, (chin - 0.02) * length
-        add_function_keys(rng, phone, "body", front_face(0.0), 0.8 * half, upright, 0.0013, 0)
+        add_function_keys(draws, phone, "body", front_face(0.0), 0.8 * half, upright, 0.0013, 0)
     else:
         face = Face(np.array([0.5 * thick, 0.0, length]), np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0]))
         outline = key_outline("pill", (0.25 * half, 0.3 * thick), 8)
         add_key(phone, "body", "button_0", face, (0.6 * half, 0.0), outline, 0.0013, 0.0004)
-    _side_keys(rng, phone, half, 0.5 * thick, (0.0, length), thick)
-    _stand(rng, phone, half, thick + 0.0045, length)
+    _side_keys(draws, phone, half, 0.5 * thick, (0.0, length), thick)
+    _stand(draws, phone, half, thick + 0.0045, length)
 
 
-def _cordless(rng: Rng, phone: Assembly) -> None:
+def _cordless(draws: Draws, phone: Assembly) -> None:
     """A handset that stands in a dock, and is drawn out upwards."""
-    length, half, thick = _size(rng)
+    length, half, thick = _size(draws)
     length, thick = 1.1 * length, max(thick, 0.016)
-    floor, rise = 0.004 + 0.2 * thick, length * rng.uniform(0.12, 0.3)
+    floor, rise = 0.004 + 0.2 * thick, length * draws.number("dock_height", (0.12, 0.3))
     room = 0.0015
-    size = np.array([2.0 * half * rng.uniform(1.3, 2.6), thick * rng.uniform(2.2, 5.0)])
-    low, high = (-0.5 * size[1], -0.5 * size[0]), (0.5 * size[1], 0.5 * size[0])
-    taper = rng.uniform(0.6, 0.95)
-    dock = box((*low, 0.0), (*high, floor))
+    size = 2.0 * half * draws.number("dock_width", (1.3, 2.6)), thick * draws.number("dock_depth", (2.2, 5.0))
+    taper = draws.number("dock_taper", (0.6, 0.95))
+    dock = box(0.5 * size[1], 0.5 * size[0], (0.0, floor))
     opening = np.array([0.5 * thick + room, half + room])
     for s in (-1.0, 1.0):  # walls about the handset's foot
         for axis in (0, 1):
@@ -256,13 +263,15 @@ def _cordless(rng: Rng, phone: Assembly) -> None:
     phone.add("dock", dock, density=900.0)
     start = floor + GAP
     face = front_face(-0.5 * thick, 0.0, start)
-    body = _slab(rng, half, (-0.5 * thick, 0.5 * thick), (start, start + length), 1)
+    body = _slab(draws.within("base"), half, (-0.5 * thick, 0.5 * thick), (start, start + length), 1)
     inner = 0.74 * half
-    body += box((-0.5 * thick - 0.0005, 0.0), inner, (start + 0.68 * length, start + 0.9 * length))
-    if rng.random() < 0.4:
-        y = rng.choice([-0.6, 0.6]) * half
-        top = start + length * rng.uniform(1.08, 1.4)
+    upright = (start + 0.68 * length, start + 0.9 * length)
+    body += box((-0.5 * thick - 0.0005, 0.0), inner, upright).called("display", FRONT)
+    if draws.chance("stub", 0.4):  # of an antenna
+        y = 0.6 * drawn_side(draws, "stub_side") * half
+        top = start + length * draws.number("stub_top", (1.08, 1.4))
         body += rod(0, y, (start + 0.9 * length, top), 0.25 * thick, 0.18 * thick, 12)
-    lift = prismatic("dock", (0, 0, 1), 0.0, length * rng.uniform(0.4, 1.2), (0, 0, start))
+    lift = prismatic("dock", (0, 0, 1), 0.0, length * draws.number("handset_travel", (0.4, 1.2)), (0, 0, start))
     phone.add("handset", body, lift, density=900.0)
-    add_keypad(rng, phone, "handset", face, inner, (rise + 0.05 * length, 0.66 * length), rng.uniform(0.0011, 0.002))
+    height = draws.length("key_height", (0.0011, 0.002))
+    add_keypad(draws, phone, "handset", face, inner, (rise + 0.05 * length, 0.66 * length), height)

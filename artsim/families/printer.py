@@ -10,22 +10,37 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from artsim.families.keys import add_key, front_face, key_cells, key_outline, top_face
-from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
+from artsim.families.details import drawn_from, drawn_side
+from artsim.families.keys import add_buttons, front_face, key_cells, key_outline, top_face
+from artsim.making.assembly import Assembly, prismatic, revolute
+from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, about, rounded_rectangle
 from artsim.making.solids import Solid, box, hull, posts, prism, rod, tray, union
 from artsim.model.kinematics import Array
 
 GAP = 0.002
 SHELF = 0.005
+_MEASURES = {
+    "inkjet": ((0.28, 0.52), (0.34, 0.56)),
+    "laser": ((0.3, 0.52), (0.32, 0.56)),
+    "copier": ((0.44, 0.72), (0.44, 0.8)),
+    "small": ((0.1, 0.26), (0.1, 0.26)),
+}
+"""Depth and width, metres."""
+_DRAWERS = {"inkjet": ((0.03, 0.06), (0, 2)), "laser": ((0.04, 0.08), (1, 3)), "copier": ((0.09, 0.16), (1, 4)),
+            "small": ((0.02, 0.04), (0, 1))}  # fmt: skip
+"""Height of the drawers, metres, and how many there are."""
+_OUTPUTS = {"inkjet": ["flap", "tray", "niche"], "laser": ["flap", "solid", "flap"],
+            "copier": ["niche", "flap", "solid"], "small": ["slit", "flap", "tray"]}  # fmt: skip
+"""What the band where paper comes out may be."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Case:
     """The body, seen from above."""
 
-    x: float  # half of the depth and of the width
-    y: float  # half of the depth and of the width
+    x: float  # half of the depth
+    y: float  # half of the width
     outline: Array  # (N, 2) rounded rectangle of x and y
 
     def block(
@@ -49,60 +64,52 @@ class _Band:
     height: float
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """A printer; drawers, lids and flaps are shut and no key is pressed at rest."""
-    kind = pick(rng, {"inkjet": 0.4, "laser": 0.24, "copier": 0.18, "small": 0.18})
-    size = {
-        "inkjet": ((0.14, 0.17), (0.26, 0.28)),
-        "laser": ((0.15, 0.16), (0.26, 0.28)),
-        "copier": ((0.22, 0.22), (0.36, 0.4)),
-        "small": ((0.05, 0.05), (0.13, 0.13)),
-    }[kind]
-    x, y = rng.uniform(*size)
-    radius = min(x, y) * rng.choice([rng.uniform(0.01, 0.1), rng.uniform(0.1, 0.35)])
+    kind = draws.pick("kind", {"inkjet": 0.4, "laser": 0.24, "copier": 0.18, "small": 0.18})
+    deep, wide = _MEASURES[kind]
+    x, y = 0.5 * draws.length("depth", deep), 0.5 * draws.length("width", wide)
+    radius = min(x, y) * drawn_from(draws, "corner", {"sharp": (0.01, 0.1), "round": (0.1, 0.35)})
     case = _Case(x, y, rounded_rectangle((-x, -y), (x, y), radius, 3))
-    foot = rng.uniform(0.02, 0.05) if kind == "copier" else rng.uniform(0.002, 0.012)
-    bands = _bands(rng, kind, min(x, y))
+    foot = draws.length("foot_height", (0.02, 0.05) if kind == "copier" else (0.002, 0.012))
+    bands = _bands(draws, kind, min(x, y))
     levels = foot + SHELF + np.concatenate([[0.0], np.cumsum([band.height + SHELF for band in bands])])
     body = case.block(foot, foot + SHELF) + _feet(case, foot, kind == "copier")
-    half = (y - max(radius * 0.3, 0.008)) * rng.uniform(0.75, 0.98)
-    cavity = 2.0 * x * rng.uniform(0.55, 0.85)
+    half = (y - max(radius * 0.3, 0.008)) * draws.number("drawer_width", (0.75, 0.98))
+    cavity = 2.0 * x * draws.number("drawer_depth", (0.55, 0.85))
     for band, low in zip(bands, levels[:-1], strict=True):
         high = float(low) + band.height
-        deep = {"solid": 0.0, "panel": 0.0, "tilting panel": min(0.05, 0.5 * x), "slit": 0.3 * x}.get(band.kind, cavity)
+        deep = {"solid": 0.0, "panel": 0.0, "tilting": min(0.05, 0.5 * x), "slit": 0.3 * x}.get(band.kind, cavity)
         if deep:
             body += case.around(float(low) - 1e-4, high + 1e-4, half, deep)
         else:
             body += case.block(float(low) - 1e-4, high + 1e-4)
         body += case.block(high, high + SHELF)
     top = float(levels[-1])
-    slopes = kind == "laser" and rng.random() < 0.65
-    rise = x * rng.uniform(0.15, 0.4)
+    slopes = kind == "laser" and draws.chance("output_slope", 0.65)
+    rise = x * draws.number("slope_height", (0.15, 0.4))
     if slopes:
-        body += _slope(case, top, rise, y * rng.uniform(0.75, 0.9))
+        body += _slope(case, top, rise, y * draws.number("slope_width", (0.75, 0.9)))
     printer = Assembly("body", body, 350.0)
     for number, (band, low) in enumerate(zip(bands, levels[:-1], strict=True)):
-        _fill(rng, printer, case, band, number, float(low), half, cavity)
-    if slopes:
-        _paper_stop(rng, printer, case, top + 0.75 * rise)
-    else:
-        _lid(rng, printer, case, kind, top)
+        _fill(draws.within(band.kind), printer, case, band, number, float(low), half, cavity)
+    if not slopes:
+        _lid(draws, printer, case, kind, top)
+    elif draws.chance("paper_stop", 0.7, upper=True):
+        _paper_stop(draws, printer, case, top + 0.75 * rise)
     return printer
 
 
-def _bands(rng: Rng, kind: str, size: float) -> list[_Band]:
+def _bands(draws: Draws, kind: str, size: float) -> list[_Band]:
     """The front from the bottom up."""
-    deep = {"inkjet": (0.03, 0.06), "laser": (0.04, 0.08), "copier": (0.09, 0.16), "small": (0.02, 0.04)}[kind]
-    drawers = {"inkjet": (0, 3), "laser": (1, 4), "copier": (1, 5), "small": (0, 2)}[kind]
-    bands = [_Band("drawer", rng.uniform(*deep)) for _ in range(int(rng.integers(*drawers)))]
-    output = size * rng.uniform(0.3, 0.7)
-    kinds = {"inkjet": ["flap", "sliding tray", "niche"], "laser": ["flap", "solid", "flap"],
-             "copier": ["niche", "flap", "solid"], "small": ["slit", "flap", "sliding tray"]}[kind]  # fmt: skip
-    bands.append(_Band(pick(rng, kinds), output))
-    if kind == "laser" and rng.random() < 0.5:
-        bands.append(_Band("flap", size * rng.uniform(0.3, 0.8)))
-    panel = pick(rng, {"panel": 0.45, "tilting panel": 0.35, "solid": 0.2})
-    bands.append(_Band(panel, size * rng.uniform(0.2, 0.5)))
+    tall, count = _DRAWERS[kind]
+    bands = [_Band("drawer", draws.length("drawer_height", tall)) for _ in range(draws.integer("drawers", *count))]
+    output = size * draws.number("output_height", (0.3, 0.7))
+    bands.append(_Band(draws.pick("output", _OUTPUTS[kind]), output))
+    if kind == "laser" and draws.chance("upper_flap", 0.5):
+        bands.append(_Band("flap", size * draws.number("upper_flap_height", (0.3, 0.8))))
+    panel = draws.pick("controls", {"panel": 0.45, "tilting": 0.35, "solid": 0.2})
+    bands.append(_Band(panel, size * draws.number("controls_height", (0.2, 0.5))))
     return bands
 
 
@@ -124,78 +131,77 @@ def _feet(case: _Case, height: float, casters: bool) -> Solid:
 
 
 def _fill(
-    rng: Rng, printer: Assembly, case: _Case, band: _Band, number: int, low: float, half: float, cavity: float
+    draws: Draws, printer: Assembly, case: _Case, band: _Band, number: int, low: float, half: float, cavity: float
 ) -> None:
     """What moves in a band of the front."""
     front, high = -case.x, low + band.height
     wide = half - GAP
-    thick = min(rng.uniform(0.006, 0.014), 0.3 * band.height)
+    thick = min(draws.length("thickness", (0.006, 0.014)), 0.3 * band.height)
     solid = box((front, front + thick), wide, (low + GAP, high - GAP), fillet=0.03 * wide, axis=0, steps=2)
     if band.kind == "drawer":
         depth = cavity - 2.0 * GAP
-        rise = (high - low) * rng.uniform(0.5, 0.85)
+        rise = (high - low) * draws.number("wall_height", (0.5, 0.85))
         solid += tray((front + 0.5 * thick, -0.96 * wide, low + GAP), (front + depth, 0.96 * wide, low + rise), 0.003)
-        solid += _pull(rng, front, 0.35 * wide, low + GAP, high - GAP)
-        slide = prismatic("body", FRONT, 0.0, depth * rng.uniform(0.6, 0.9), (front, 0, low))
+        solid += _pull(draws, front, 0.35 * wide, low + GAP, high - GAP)
+        slide = prismatic("body", FRONT, 0.0, depth * draws.number("travel", (0.6, 0.9)), (front, 0, low))
         printer.add(f"drawer_{number}", solid, slide, density=700.0)
     elif band.kind == "flap":
-        if rng.random() < 0.6:
-            solid += box((front - 0.006, front + 0.5 * thick), 0.15 * wide, (high - GAP - 0.012, high - GAP - 0.004))
-        if rng.random() < 0.4:  # guides for paper on its inner side
+        if draws.chance("handle", 0.6):
+            upright = (high - GAP - 0.012, high - GAP - 0.004)
+            solid += box((front - 0.006, front + 0.5 * thick), 0.15 * wide, upright).called("handle", FRONT)
+        if draws.chance("guides", 0.4):  # for paper, on its inner side
             deep = (front + thick - 0.001, front + thick + 0.006)
             tall = (low + 0.2 * band.height, high - 0.1 * band.height)
             solid += union(box(deep, about(s * 0.7 * wide, 0.003), tall) for s in (-1, 1))
-        hinge = revolute("body", (0, -1, 0), (front, 0, low + GAP), 0.0, rng.uniform(0.9, 1.55))
+        hinge = revolute("body", (0, -1, 0), (front, 0, low + GAP), 0.0, draws.angle("angle", (0.9, 1.55)))
         printer.add(f"flap_{number}", solid, hinge, density=900.0)
-    elif band.kind == "sliding tray":
-        depth = cavity * rng.uniform(0.6, 0.95)
+    elif band.kind == "tray":
+        depth = cavity * draws.number("depth", (0.6, 0.95))
         z = low + GAP
         solid = box((front, front + depth), 0.9 * wide, (z, z + 0.004))
         solid += box((front, front + 0.005), 0.9 * wide, (z, z + min(0.3 * band.height, 0.014)))
         slide = prismatic("body", FRONT, 0.0, 0.85 * depth, (front, 0, low))
         printer.add(f"tray_{number}", solid, slide, density=900.0)
-    elif band.kind == "tilting panel":
-        hinge = revolute("body", (0, 1, 0), (front, 0, high - GAP), 0.0, rng.uniform(0.4, 1.2))
+    elif band.kind == "tilting":
+        hinge = revolute("body", (0, 1, 0), (front, 0, high - GAP), 0.0, draws.angle("angle", (0.4, 1.2)))
         name = printer.add(f"panel_{number}", solid, hinge, density=900.0)
-        _keys(rng, printer, name, front, wide, low + GAP, high - GAP)
+        _keys(draws, printer, name, front, wide, low + GAP, high - GAP)
     elif band.kind == "panel":
-        _keys(rng, printer, "body", front, half, low, high)
+        _keys(draws, printer, "body", front, half, low, high)
 
 
-def _pull(rng: Rng, front: float, half: float, low: float, high: float) -> Solid:
+def _pull(draws: Draws, front: float, half: float, low: float, high: float) -> Solid:
     """Handle of a drawer: a lip, a bar or nothing."""
-    kind, reach = rng.random(), rng.uniform(0.006, 0.016)
-    if kind < 0.35:
-        return box((front - reach, front + 0.003), half, (high - 0.3 * (high - low), high - 0.15 * (high - low)))
-    if kind < 0.6:
-        z = 0.5 * (low + high)
-        deep = min(0.2 * (high - low), 0.01)
-        return box((front - reach, front + 0.003), half, (z - deep, z + deep), fillet=0.4 * deep, axis=1, steps=2)
+    kind = draws.pick("handle", {"lip": 0.35, "bar": 0.25, "none": 0.4})
+    deep, tall = (front - draws.length("handle_reach", (0.006, 0.016)), front + 0.003), high - low
+    if kind == "lip":
+        return box(deep, half, (high - 0.3 * tall, high - 0.15 * tall)).called("handle", FRONT)
+    if kind == "bar":
+        r = min(0.2 * tall, 0.01)
+        bar = box(deep, half, about(0.5 * (low + high), r), fillet=0.4 * r, axis=1, steps=2)
+        return bar.called("handle", FRONT)
     return Solid()
 
 
-def _keys(rng: Rng, printer: Assembly, parent: str, front: float, half: float, low: float, high: float) -> None:
+def _keys(draws: Draws, printer: Assembly, parent: str, front: float, half: float, low: float, high: float) -> None:
     """Keys on a panel in front: a group on one side, or on both."""
     face = front_face(front, 0.0, 0.5 * (low + high))
     rise = high - low
     if rise < 0.012:
         return
-    rows = int(rng.integers(1, 4)) if rise > 0.035 else 1
+    rows = draws.integer("key_rows", 1, 3) if rise > 0.035 else 1
     pitch = min(0.85 * rise / rows, 0.03)
-    columns = int(rng.integers(1, 6))
-    travel = rng.uniform(0.0008, 0.0015)
-    outline = key_outline(pick(rng, ["round", "square", "pill"]), (0.68 * pitch, 0.6 * pitch), 10)
-    sides = [-1.0, 1.0] if rng.random() < 0.3 else [float(rng.choice([-1.0, 1.0]))]
+    columns = draws.integer("key_columns", 1, 5)
+    travel = draws.length("key_travel", (0.0008, 0.0015))
+    outline = key_outline(draws.pick("key_shape", ["round", "square", "pill"]), (0.68 * pitch, 0.6 * pitch), 10)
+    sides = [-1.0, 1.0] if draws.chance("keys_on_both_sides", 0.3) else [drawn_side(draws, "keys_side")]
     columns = min(columns, int(0.6 * half / pitch), 12 // (rows * len(sides)))
     number = 0
     for side in sides:
         middle = side * (0.9 * half - 0.5 * columns * pitch)
         reach = 0.5 * columns * pitch
-        for _, _, u, v in key_cells(
-            (middle - reach, middle + reach), (-0.45 * rise, 0.45 * rise), max(columns, 1), rows
-        ):
-            add_key(printer, parent, f"button_{number}", face, (u, v), outline, travel + 0.002, travel)
-            number += 1
+        spots = key_cells(about(middle, reach), about(0.0, 0.45 * rise), max(columns, 1), rows)
+        number = add_buttons(printer, parent, face, spots, outline, travel + 0.002, travel, first=number)
 
 
 # --- the top ---------------------------------------------------------------------------------------------------------
@@ -210,32 +216,30 @@ def _slope(case: _Case, top: float, rise: float, side: float) -> Solid:
     return solid + hull([(x * case.x, s * (side + 1e-4), z) for x, z in slope for s in (-1, 1)])
 
 
-def _paper_stop(rng: Rng, printer: Assembly, case: _Case, level: float) -> None:
-    """A flap that lies on the front end of the slope and folds up, on some."""
-    if rng.random() < 0.3:
-        return
-    thick, z = 0.004, level + GAP
-    wide, first = case.y * rng.uniform(0.1, 0.6), -0.86 * case.x
-    flap = box((first, rng.uniform(-0.6, -0.3) * case.x), wide, (z, z + thick), fillet=0.008, axis=2, steps=2)
-    hinge = revolute("body", (0, -1, 0), (first, 0, z), 0.0, rng.uniform(0.6, 1.6))
+def _paper_stop(draws: Draws, printer: Assembly, case: _Case, level: float) -> None:
+    """A flap that lies on the front end of the slope and folds up."""
+    z, first = level + GAP, -0.86 * case.x
+    wide, end = case.y * draws.number("paper_stop_width", (0.1, 0.6)), draws.number("paper_stop_end", (-0.6, -0.3))
+    flap = box((first, end * case.x), wide, (z, z + 0.004), fillet=0.008, axis=2, steps=2)
+    hinge = revolute("body", (0, -1, 0), (first, 0, z), 0.0, draws.angle("paper_stop_angle", (0.6, 1.6)))
     printer.add("paper_stop", flap, hinge, density=900.0)
 
 
-def _lid(rng: Rng, printer: Assembly, case: _Case, kind: str, top: float) -> None:
+def _lid(draws: Draws, printer: Assembly, case: _Case, kind: str, top: float) -> None:
     """The lid of a scanner, at times with a feeder; keys before it and a paper support behind it."""
     seam = top + GAP
     back = case.x
-    if kind in ("inkjet", "small") and rng.random() < 0.45:
-        back = case.x * rng.uniform(0.45, 0.65)
-        _paper_support(rng, printer, case, seam, back)
-    thick = rng.uniform(0.1, 0.35) * min(case.x, 0.18)
+    if kind in ("inkjet", "small") and draws.chance("paper_support", 0.45):
+        back = case.x * draws.number("lid_end", (0.45, 0.65))
+        _paper_support(draws.within("paper_support"), printer, case, seam, back)
+    thick = draws.number("lid_thickness", (0.1, 0.35)) * min(case.x, 0.18)
     front = -case.x
-    if rng.random() < 0.4:  # a strip with keys before the lid
-        front += case.x * rng.uniform(0.2, 0.5)
-        _top_keys(rng, printer, case, top, front)
+    if draws.chance("top_controls", 0.4):  # a strip with keys before the lid
+        front += case.x * draws.number("top_controls_depth", (0.2, 0.5))
+        _top_keys(draws.within("top"), printer, case, top, front)
     outline = np.clip(case.outline, (front, -9.0), (back - (0.0 if back == case.x else thick + GAP), 9.0))
     edge = float(outline[:, 0].max())
-    shrink = rng.uniform(0.9, 1.0)
+    shrink = draws.number("lid_taper", (0.9, 1.0))
     middle = outline.mean(axis=0)
     lid = prism(outline, seam, seam + 0.6 * thick)
     lid += hull(
@@ -243,42 +247,40 @@ def _lid(rng: Rng, printer: Assembly, case: _Case, kind: str, top: float) -> Non
         + [(*(middle + shrink * (p - middle)), seam + thick) for p in outline]
     )
     crown = seam + thick
-    feeder = back == case.x and kind != "small" and rng.random() < (0.6 if kind == "copier" else 0.35)
+    feeder = back == case.x and kind != "small" and draws.chance("feeder_tray", 0.6 if kind == "copier" else 0.35)
     if feeder:
-        rise = rng.uniform(0.03, 0.09)
+        rise = draws.length("feeder_height", (0.03, 0.09))
         y0, y1 = 0.15 * case.y, 0.8 * case.y
         deep = (front + 0.15 * case.x, edge - 0.1 * case.x)
         lid += box(deep, (y0, y1), (crown - 0.002, crown + rise), fillet=0.3 * rise, axis=0)
-    printer.add("lid", lid, revolute("body", (0, 1, 0), (edge, 0, seam), 0.0, rng.uniform(0.7, 1.5)), density=300.0)
+    hinge = revolute("body", (0, 1, 0), (edge, 0, seam), 0.0, draws.angle("lid_angle", (0.7, 1.5)))
+    printer.add("lid", lid, hinge, density=300.0)
     if feeder:
-        z, wide = crown + GAP, 0.6 * (edge - front) * rng.uniform(0.5, 0.9)
+        z, wide = crown + GAP, 0.6 * (edge - front) * draws.number("feeder_tray_width", (0.5, 0.9))
         x = 0.5 * (front + edge)
-        end = -0.85 * case.y
-        solid = box((x - 0.5 * wide, x + 0.5 * wide), (end, y0 - GAP), (z, z + 0.006), fillet=0.01, axis=2)
-        turn = revolute("lid", (-1, 0, 0), (x, y0 - GAP, z + 0.006), 0.0, rng.uniform(0.25, 0.9))
+        solid = box(about(x, 0.5 * wide), (-0.85 * case.y, y0 - GAP), (z, z + 0.006), fillet=0.01, axis=2)
+        turn = revolute("lid", FRONT, (x, y0 - GAP, z + 0.006), 0.0, draws.angle("feeder_tray_angle", (0.25, 0.9)))
         printer.add("feeder_tray", solid, turn, density=600.0)
 
 
-def _top_keys(rng: Rng, printer: Assembly, case: _Case, top: float, back: float) -> None:
+def _top_keys(draws: Draws, printer: Assembly, case: _Case, top: float, back: float) -> None:
     """Keys on top, before the lid."""
     room = back + case.x
     pitch = min(0.6 * room, 0.03)
-    columns = min(int(rng.integers(2, 8)), int(1.2 * case.y / pitch))
-    travel = rng.uniform(0.0008, 0.0015)
-    outline = key_outline(pick(rng, ["round", "square", "pill"]), (0.7 * pitch, 0.6 * pitch), 10)
+    columns = min(draws.integer("key_columns", 2, 7), int(1.2 * case.y / pitch))
+    travel = draws.length("key_travel", (0.0008, 0.0015))
+    outline = key_outline(draws.pick("key_shape", ["round", "square", "pill"]), (0.7 * pitch, 0.6 * pitch), 10)
     face = top_face(top, -case.x + 0.5 * room, 0.0)
-    middle = rng.uniform(-0.3, 0.3) * case.y
-    for _, column, u, v in key_cells(
-        (middle - 0.5 * columns * pitch, middle + 0.5 * columns * pitch), (-0.01, 0.01), columns, 1
-    ):
-        add_key(printer, "body", f"top_button_{column}", face, (u, v), outline, travel + 0.002, travel)
+    middle = draws.number("key_place", (-0.3, 0.3)) * case.y
+    spots = key_cells(about(middle, 0.5 * columns * pitch), (-0.01, 0.01), columns, 1)
+    add_buttons(printer, "body", face, spots, outline, travel + 0.002, travel, label="top_button")
 
 
-def _paper_support(rng: Rng, printer: Assembly, case: _Case, seam: float, front: float) -> None:
+def _paper_support(draws: Draws, printer: Assembly, case: _Case, seam: float, front: float) -> None:
     """A flap that lies over the paper's slot at the back and folds up and back."""
-    thick, wide = rng.uniform(0.004, 0.01), case.y * rng.uniform(0.5, 0.85)
+    thick, wide = draws.length("thickness", (0.004, 0.01)), case.y * draws.number("width", (0.5, 0.85))
     solid = box((front + GAP, case.x - 0.004), wide, (seam, seam + thick), fillet=0.01, axis=2)
     x, z = case.x - 0.004, seam + 0.5 * thick
     solid += rod(x, (-wide, wide), z, 0.5 * thick, sections=12)
-    hinge = revolute("body", (0, 1, 0), (x, 0, z), 0.0, rng.uniform(1.3, 2.1))
+    hinge = revolute("body", (0, 1, 0), (x, 0, z), 0.0, draws.angle("angle", (1.3, 2.1)))
     printer.add("paper_support", solid, hinge, density=800.0)

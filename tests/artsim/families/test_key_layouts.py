@@ -15,14 +15,15 @@ from artsim.families.key_layouts import (
     macro_layout,
     number_layout,
 )
+from artsim.making.draws import Draws
 
-Layout = Callable[[np.random.Generator], list[list[Cell]]]
+Layout = Callable[[Draws], list[list[Cell]]]
 
 
 @pytest.mark.parametrize("layout", [full_layout, compact_layout, number_layout, macro_layout, half_layout])
 def test_no_two_keys_of_a_layout_overlap(layout: Layout) -> None:
     for seed in range(30):
-        groups = layout(np.random.default_rng(seed))
+        groups = layout(Draws(np.random.default_rng(seed)))
         cells = np.array([cell for group in groups for cell in group])
         apart = np.abs(cells[:, None, :2] - cells[None, :, :2]) - 0.5 * (cells[:, None, 2:] + cells[None, :, 2:])
         clear = (apart > -1e-9).any(axis=-1) | np.eye(len(cells), dtype=bool)

@@ -47,9 +47,9 @@ def test_a_pressed_key_comes_close_to_its_face_and_does_not_touch_it(face: Face)
 
 def test_cells_go_from_the_upper_left_along_the_rows() -> None:
     cells = list(key_cells((-3.0, 3.0), (0.0, 4.0), 3, 2))
-    assert cells[0] == (0, 0, -2.0, 3.0)
-    assert cells[2] == (0, 2, 2.0, 3.0)
-    assert cells[-1] == (1, 2, 2.0, 1.0)
+    assert cells[0] == (-2.0, 3.0)
+    assert cells[2] == (2.0, 3.0)
+    assert cells[-1] == (2.0, 1.0)
 
 
 def test_a_sleeve_is_a_box_less_its_hole_and_its_round_edges() -> None:
