@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from artsim.making.assembly import Rng
+from artsim.making.draws import Draws
 from artsim.model.kinematics import Array
 
 MOST_KEYS = 40
@@ -20,61 +20,61 @@ def grid_layout(v: float, columns: int, rows: int) -> list[list[Cell]]:
     return [[(c + 0.5, v - r - 0.5, 1.0, 1.0)] for r in range(rows) for c in range(columns)]
 
 
-def key_row(rng: Rng, u: float, v: float, units: float, space: bool) -> list[Cell]:
+def key_row(draws: Draws, u: float, v: float, units: float, space: bool) -> list[Cell]:
     """Keys from u on, ``units`` pitches together, with wider ones at the ends or a space bar in the middle."""
     if space:
-        sides = int(rng.integers(1, 4))
+        sides = draws.integer("keys_beside_space", 1, 3)
         bar = units - 2 * sides * 1.25
         widths = [1.25] * sides + [bar] + [1.25] * sides
     else:
-        first = float(rng.choice([1.0, 1.5, 1.75, 2.25]))
+        first = draws.pick("first_key", [1.0, 1.5, 1.75, 2.25])
         count = int(units - first - 1.0)
         widths = [first, *[1.0] * count, units - first - count]
     edges = u + np.concatenate([[0.0], np.cumsum(widths)])
     return [(0.5 * (a + b), v - 0.5, b - a, 1.0) for a, b in pairwise(edges)]
 
 
-def full_layout(rng: Rng) -> list[list[Cell]]:
+def full_layout(draws: Draws) -> list[list[Cell]]:
     """Rows that move as one each; the space bar and some keys by themselves; blocks to the right."""
-    units, rows = float(rng.integers(12, 16)), int(rng.integers(4, 6))
-    groups = [key_row(rng, 0.0, float(rows - r), units, r == rows - 1) for r in range(rows)]
+    units, rows = float(draws.integer("row_keys", 12, 15)), draws.integer("key_rows", 4, 5)
+    groups = [key_row(draws, 0.0, float(rows - r), units, r == rows - 1) for r in range(rows)]
     last = groups.pop()
     middle = len(last) // 2
     groups += [[last[middle]], last[:middle], last[middle + 1 :]]
-    if rng.random() < 0.6:  # function keys
-        top = rows + 1.0 + rng.uniform(0.1, 0.5)
+    if draws.chance("function_keys", 0.6):
+        top = rows + 1.0 + draws.number("function_keys_gap", (0.1, 0.5))
         for k in range(3):
             groups.append(
                 [(c + 0.5 + k * units / 3.0 + 0.2, top - 0.5, 1.0, 0.85) for c in range(int(units / 3.0 - 0.2))]
             )
     right = units
-    if rng.random() < 0.6:  # the cursor block
+    if draws.chance("cursor_block", 0.6):
         right += 0.3
         groups.append([(right + c + 0.5, 0.5, 1.0, 1.0) for c in range(3)] + [(right + 1.5, 1.5, 1.0, 1.0)])
         groups.append([(right + c + 0.5, rows - r - 0.5, 1.0, 1.0) for r in range(2) for c in range(3)])
         right += 3.0
-    if rng.random() < 0.5:  # the number block
+    if draws.chance("number_block", 0.5):
         right += 0.3
         groups += [[(right + c + 0.5, rows - r - 0.5, 1.0, 1.0) for c in range(4)] for r in range(rows)]
     return groups
 
 
-def compact_layout(rng: Rng) -> list[list[Cell]]:
+def compact_layout(draws: Draws) -> list[list[Cell]]:
     """Three or four rows of single keys."""
-    rows = int(rng.integers(3, 5))
-    units = float(rng.integers(8, 13 if rows == 3 else 11))
-    groups = [[cell] for r in range(rows - 1) for cell in key_row(rng, 0.0, float(rows - r), units, False)]
-    return groups + [[cell] for cell in key_row(rng, 0.0, 1.0, units, units > 8)]
+    rows = draws.integer("key_rows", 3, 4)
+    units = float(draws.integer("row_keys", 8, 12 if rows == 3 else 10))
+    groups = [[cell] for r in range(rows - 1) for cell in key_row(draws, 0.0, float(rows - r), units, False)]
+    return groups + [[cell] for cell in key_row(draws, 0.0, 1.0, units, units > 8)]
 
 
-def number_layout(rng: Rng) -> list[list[Cell]]:
+def number_layout(draws: Draws) -> list[list[Cell]]:
     """A number pad; at times with a double 0 and tall keys."""
-    rows, columns = int(rng.integers(4, 7)), int(rng.integers(3, 6))
+    rows, columns = draws.integer("key_rows", 4, 6), draws.integer("key_columns", 3, 5)
     groups = grid_layout(float(rows), columns, rows)
-    if rng.random() < 0.7:
+    if draws.chance("wide_zero", 0.7):
         del groups[-columns : -columns + 2]
         groups.append([(1.0, 0.5, 2.0, 1.0)])
-    if rng.random() < 0.6:
+    if draws.chance("tall_key", 0.6):
         tall = [(columns - 0.5, 0.5, 1.0, 1.0), (columns - 0.5, 1.5, 1.0, 1.0)]
         if all([cell] in groups for cell in tall):
             groups = [group for group in groups if group[0] not in tall]
@@ -82,9 +82,9 @@ def number_layout(rng: Rng) -> list[list[Cell]]:
     return groups
 
 
-def macro_layout(rng: Rng) -> list[list[Cell]]:
+def macro_layout(draws: Draws) -> list[list[Cell]]:
     """A few keys in a grid."""
-    return grid_layout(0.0, int(rng.integers(1, 7)), int(rng.integers(1, 5)))
+    return grid_layout(0.0, draws.integer("key_columns", 1, 6), draws.integer("key_rows", 1, 4))
 
 
 def extent(groups: Sequence[Sequence[Cell]]) -> Array:
@@ -94,9 +94,9 @@ def extent(groups: Sequence[Sequence[Cell]]) -> Array:
     return extent
 
 
-def half_layout(rng: Rng) -> list[list[Cell]]:
+def half_layout(draws: Draws) -> list[list[Cell]]:
     """Keys of one half: single ones, or rows."""
-    rows, units = int(rng.integers(3, 6)), float(rng.integers(4, 8))
+    rows, units = draws.integer("key_rows", 3, 5), float(draws.integer("row_keys", 4, 7))
     if rows * units <= 0.5 * MOST_KEYS:
         return grid_layout(float(rows), int(units), rows)
-    return [key_row(rng, 0.0, float(rows - r), units, False) for r in range(rows)]
+    return [key_row(draws, 0.0, float(rows - r), units, False) for r in range(rows)]

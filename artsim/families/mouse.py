@@ -12,7 +12,8 @@ from artsim.common.elementary import cos, sin
 from artsim.common.products import apply
 from artsim.families.details import holed_plate
 from artsim.families.keys import Face, key, key_outline, press, top_face
-from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, revolute
+from artsim.making.assembly import Assembly, JointSpec, continuous, revolute
+from artsim.making.draws import Draws
 from artsim.making.solids import Solid, cylinder, ellipsoid, hull, loft, rod, tube, union
 from artsim.model.kinematics import Array
 from artsim.model.transforms import rotation_about
@@ -23,25 +24,28 @@ GAP = 0.0007
 class _Dome:
     """The outer shape: height, half width and lateral shift at stations along X, front first."""
 
-    def __init__(self, rng: Rng) -> None:
-        length = rng.uniform(0.07, 0.14)
-        half = 0.5 * length * rng.triangular(0.4, 0.58, 0.85)
-        height = length * rng.triangular(0.13, 0.32, 0.5)
+    def __init__(self, draws: Draws) -> None:
+        length = draws.length("depth", (0.07, 0.14))
+        half = 0.5 * length * draws.triangular("width", 0.4, 0.58, 0.85)  # this and the height: over the depth
+        height = length * draws.triangular("height", 0.13, 0.32, 0.5)
         share = np.array([0.0, 0.03, 0.1, 0.22, 0.38, 0.55, 0.72, 0.86, 0.95, 1.0])
-        top = rng.uniform(0.35, 0.8)
-        front, back = rng.uniform(0.3, 0.85), rng.uniform(0.15, 0.8)
+        top = draws.number("hump_place", (0.35, 0.8))
+        front, back = draws.number("front_height", (0.3, 0.85)), draws.number("back_height", (0.15, 0.8))
         before, behind = np.maximum(top - share, 0.0) / top, np.maximum(share - top, 0.0) / (1.0 - top)
         profile = 1.0 - (1.0 - front) * np.square(before) - (1.0 - back) * np.square(behind) * np.sqrt(behind)
-        ends = rng.uniform(0.1, 0.75, 2)
+        ends = draws.number("front_taper", (0.1, 0.75)), draws.number("back_taper", (0.1, 0.75))
         near, far = np.maximum(1.0 - share / 0.35, 0.0), np.maximum((share - 0.6) / 0.4, 0.0)
         widths = 1.0 - ends[0] * np.square(near) - ends[1] * np.square(far)
-        waist = rng.uniform(0.0, 0.2) * rng.choice([0.0, 1.0]) * np.maximum(1.0 - np.square((share - 0.42) / 0.3), 0.0)
-        slant = rng.choice([0.0, rng.uniform(-0.25, 0.25)]) * half
+        waist = draws.number("waist", (0.0, 0.2)) * draws.pick("waisted", [False, True])
+        waist = waist * np.maximum(1.0 - np.square((share - 0.42) / 0.3), 0.0)
+        slant = draws.number("slant", (-0.25, 0.25)) * draws.pick("slanted", [False, True]) * half
         self.stations = length * (share - 0.5)
         self.heights, self.halves = height * profile, half * (widths - waist)
         self.shifts = slant * np.maximum(1.0 - np.square((share - 0.5) / 0.5), 0.0)
-        self.steep = rng.uniform(0.0, 1.0)  # 0 for a round cross-section, 1 for one with upright sides
-        self.shoulder = rng.uniform(0.15, 0.55)  # share of the height up to which the sides stand upright
+        self.steep = draws.number("steepness", (0.0, 1.0))  # 0 for a round cross-section, 1 for one with upright sides
+        self.shoulder = draws.number(
+            "shoulder", (0.15, 0.55)
+        )  # share of the height up to which the sides stand upright
 
     def at(self, x: float) -> tuple[float, float, float]:
         """Height, half width and shift at x."""
@@ -78,18 +82,23 @@ class _Dome:
         return loft([self.cut(x, *clamp, **more) for x in (first, *inside, last)])  # type: ignore[arg-type]
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """A mouse; no button is pressed at rest."""
-    dome = _Dome(rng)
-    parts = _Parts(_roll(rng))
-    _shell(rng, parts, dome)
+    dome = _Dome(draws)
+    turn = None
+    if draws.chance("upright", 0.14, upper=True):  # rolled onto its side
+        way = draws.pick("upright_hand", {"right": 0.85, "left": 0.15})
+        roll = {"right": -1.0, "left": 1.0}[way] * draws.angle("roll", (0.25, 0.85))
+        turn = rotation_about((1.0, 0.0, 0.0), roll)
+    parts = _Parts(turn)
+    _shell(draws, parts, dome)
     if parts.turn is not None:
         # An upright mouse stands on what is between its own bottom and the table.
         bottom = np.concatenate([ring[ring[:, 2] <= 0.0] for ring in map(dome.cut, dome.stations)])
         edge = np.stack([apply(parts.turn, point) for point in bottom])
-        floor = float(edge[:, 2].min()) - rng.uniform(0.001, 0.006)
+        floor = float(edge[:, 2].min()) - draws.length("foot_height", (0.001, 0.006))
         middle = edge.mean(axis=0)
-        shadow = middle + (edge - middle) * (1.0, rng.uniform(1.0, 1.4), 0.0)
+        shadow = middle + (edge - middle) * (1.0, draws.number("foot_width", (1.0, 1.4)), 0.0)
         shadow[:, 2] = floor
         parts.foot = hull(np.concatenate([edge, shadow]))
     return parts.assembly()
@@ -122,57 +131,47 @@ class _Parts:
         return mouse
 
 
-def _roll(rng: Rng) -> Array | None:
-    """(3, 3) roll of an upright mouse; None for the usual ones."""
-    if rng.random() < 0.86:
-        return None
-    return rotation_about((1.0, 0.0, 0.0), pick(rng, {-1.0: 0.85, 1.0: 0.15}) * rng.uniform(0.25, 0.85))
-
-
-def _shell(rng: Rng, parts: _Parts, dome: _Dome) -> None:
+def _shell(draws: Draws, parts: _Parts, dome: _Dome) -> None:
     """Body, buttons and what sits between them."""
     front, back = float(dome.stations[0]), float(dome.stations[-1])
     length = back - front
-    split = front + rng.uniform(0.33, 0.62) * length
-    floor = rng.uniform(0.3, 0.55)
-    count = pick(rng, {1: 0.15, 2: 0.65, 3: 0.2})
+    split = front + draws.number("button_length", (0.33, 0.62)) * length
+    floor = draws.number("button_bottom", (0.3, 0.55))
+    count = draws.pick("buttons", {1: 0.15, 2: 0.65, 3: 0.2})
     height = dome.at(split)[0]
     # The gap below the buttons, in shares of the height, leaves room for their travel.
     room = (0.0022 + GAP) / float(dome.heights[dome.stations <= split].min())
     floor = min(floor, 0.8 - room)
     half = float(dome.halves[3])
-    slot = {1: 0.0, 2: min(rng.uniform(0.003, 0.007), 0.3 * half), 3: 0.33 * half}[count]
+    slot = draws.length("slot_width", (0.003, 0.007))
+    slot = {1: 0.0, 2: min(slot, 0.3 * half), 3: 0.33 * half}[count]
     drift = float(np.interp(0.5 * (front + split), dome.stations, dome.shifts))
-    ball = _well(rng, dome, split) if rng.random() < 0.16 else None
+    ball = _well(draws, dome, split) if draws.chance("ball", 0.16) else None
     body = _rear(dome, split, ball) + dome.between(front, split + 0.0002, (-1.0, 1.0), 0.0, floor)
-    turns = bool(count == 2 and rng.random() < 0.9)
+    turns = count == 2 and draws.chance("wheel", 0.9)
     angle = 0.002 / (split - front)
     hinge_z = (floor + room) * height
     edge = split - GAP
-    spans: list[tuple[str, tuple[float, float]]] = []
+    between = (drift - slot + GAP, drift + slot - GAP)
+    spans = {"button_left": (drift + slot, 1.0), "button_right": (-1.0, drift - slot), "button_middle": between}
     if count == 1:
-        spans.append(("button", (-1.0, 1.0)))
-    else:
-        spans += [("button_left", (drift + slot, 1.0)), ("button_right", (-1.0, drift - slot))]
-    if count == 3:
-        spans.append(("button_middle", (drift - slot + GAP, drift + slot - GAP)))
-    wheel = _wheel(rng, dome, drift, slot, split, floor) if turns else None
+        spans = {"button": (-1.0, 1.0)}
+    wheel = _wheel(draws, dome, drift, slot, split, floor) if turns else None
     if count == 2:
-        clear = (drift - slot + GAP, drift + slot - GAP)
         gaps = [(front + 0.06 * length, split + 0.0002)]
         if wheel is not None:
             x, _, radius, _ = wheel
             gaps = [(gaps[0][0], x - radius - 0.001), (x + radius + 0.001, gaps[0][1])]
-        body += union(dome.between(a, b, clear, 0.0, 0.98, 0.0004) for a, b in gaps if b > a + 0.002)
-    body += _underside(rng, dome)
+        body += union(dome.between(a, b, between, 0.0, 0.98, 0.0004) for a, b in gaps if b > a + 0.002)
+    body += _underside(draws, dome)
     parts.add("body", body)
-    for name, span in spans:
+    for name, span in list(spans.items())[:count]:
         solid = dome.between(front, edge, span, floor + room)
         parts.add(name, solid, revolute("body", (0, -1, 0), (edge, 0, hinge_z), 0.0, angle))
     if wheel is not None:
         x, z, radius, wide = wheel
         solid = rod(x, (drift - wide, drift + wide), z, radius, sections=20)
-        if rng.random() < 0.6:
+        if draws.chance("wheel_ribs", 0.6):
             for a in np.arange(10) * 0.2 * np.pi:
                 at, side = np.array([x + 0.97 * radius * cos(a), drift, z + 0.97 * radius * sin(a)]), (0, 0.9 * wide, 0)
                 solid += cylinder(at - side, at + side, 0.09 * radius, sections=5)
@@ -180,71 +179,68 @@ def _shell(rng: Rng, parts: _Parts, dome: _Dome) -> None:
     if ball is not None:
         solid = ellipsoid(ball[0], ball[1], 20)
         parts.add("ball", solid, continuous("body", (0, 1, 0), tuple(ball[0])))
-    _extras(rng, parts, dome, split, ball is None)
+    _extras(draws, parts, dome, split, ball is None)
 
 
 def _wheel(
-    rng: Rng, dome: _Dome, y: float, slot: float, split: float, floor: float
+    draws: Draws, dome: _Dome, y: float, slot: float, split: float, floor: float
 ) -> tuple[float, float, float, float] | None:
     """X and Z of the axle, radius and half of the width of a wheel between the buttons."""
     front = float(dome.stations[0])
-    x = front + rng.uniform(0.35, 0.7) * (split - front)
+    x = front + draws.number("wheel_place", (0.35, 0.7)) * (split - front)
     height = dome.at(x)[0]
-    proud = rng.uniform(0.0015, 0.005)
+    proud = draws.length("wheel_height", (0.0015, 0.005))
     # It must keep clear of the floor under it, which rises to the back.
     radius = 0.5 * (height + proud - floor * dome.at(min(x + 0.012, split))[0] - 0.0016)
-    radius = min(radius, rng.uniform(0.007, 0.014), 0.42 * (split - front))
+    radius = min(radius, draws.length("wheel_radius", (0.007, 0.014)), 0.42 * (split - front))
     wide = slot - GAP
     if radius < 0.003 or wide < 0.001:
         return None
     return x, height + proud - radius, radius, wide
 
 
-def _underside(rng: Rng, dome: _Dome) -> Solid:
+def _underside(draws: Draws, dome: _Dome) -> Solid:
     """Glides below and a cable in front, on some."""
     front, back = float(dome.stations[0]), float(dome.stations[-1])
     solid = Solid()
-    if rng.random() < 0.5:
+    if draws.chance("glides", 0.5):
         for x in (0.7 * front, 0.7 * back):
             half, shift = 0.6 * dome.at(x)[1], dome.at(x)[2]
             solid += hull(
                 [(x + a * 0.006, shift + b * half, z) for a in (-1, 1) for b in (-1, 1) for z in (-0.0008, 0.001)]
             )
-    if rng.random() < 0.45:
+    if draws.chance("cable", 0.45):
         height, _, shift = dome.at(front)
-        z, radius = 0.14 * height + 0.001, min(rng.uniform(0.0012, 0.0025), 0.12 * height)
-        reach = rng.uniform(0.008, 0.05)
-        path = [
-            (front + 0.004, shift, z),
-            (front - 0.4 * reach, shift, z),
-            (front - reach, shift + rng.uniform(-0.3, 0.3) * reach, z),
-        ]
+        z, radius = 0.14 * height + 0.001, min(draws.length("cable_radius", (0.0012, 0.0025)), 0.12 * height)
+        reach = draws.length("cable_length", (0.008, 0.05))
+        end = (front - reach, shift + draws.number("cable_bend", (-0.3, 0.3)) * reach, z)
+        path = [(front + 0.004, shift, z), (front - 0.4 * reach, shift, z), end]
         solid += tube(np.array(path), [1.6 * radius, radius, radius], 8)
     return solid
 
 
-def _extras(rng: Rng, parts: _Parts, dome: _Dome, split: float, free: bool) -> None:
+def _extras(draws: Draws, parts: _Parts, dome: _Dome, split: float, free: bool) -> None:
     """Keys on the side, and on top where that is free."""
     length = float(dome.stations[-1] - dome.stations[0])
     travel = 0.0007
-    if rng.random() < 0.4:
-        _side_keys(rng, parts, dome, split, travel)
+    if draws.chance("side_key", 0.4):
+        _side_keys(draws, parts, dome, split, travel)
     start = split + 0.04 * length
-    if not free or start + 0.25 * length > dome.stations[-1] or rng.random() < 0.65:
+    if not free or start + 0.25 * length > dome.stations[-1] or not draws.chance("key", 0.35, upper=True):
         return
-    wide = min(rng.uniform(0.004, 0.009), 0.4 * float(dome.halves.max()))
+    wide = min(draws.length("key_width", (0.004, 0.009)), 0.4 * float(dome.halves.max()))
     top = float(max(dome.at(x)[0] for x in np.linspace(start, start + 0.16 * length, 7)))
-    for k in range(int(rng.integers(1, 3))):
+    for k in range(draws.integer("keys", 1, 2)):
         face = top_face(top, start + (0.04 + 0.075 * k) * length, dome.at(start)[2])
         outline = key_outline("pill", (wide, 0.055 * length), 8)
         solid = key(face, 0.0, 0.0, outline, travel + 0.0003, travel + 0.0016)
         parts.add(f"key_{k}", solid, press(face, "body", 0.0, 0.0, travel))
 
 
-def _side_keys(rng: Rng, parts: _Parts, dome: _Dome, split: float, travel: float) -> None:
+def _side_keys(draws: Draws, parts: _Parts, dome: _Dome, split: float, travel: float) -> None:
     """Keys for the thumb, on the left (+Y)."""
     back = float(dome.stations[-1])
-    count = int(rng.integers(1, 4))
+    count = draws.integer("side_keys", 1, 3)
     span = (split + 0.002, split + 0.55 * (back - split))
     pitch = (span[1] - span[0]) / count
     inside = np.linspace(*span, 9)
@@ -261,15 +257,15 @@ def _side_keys(rng: Rng, parts: _Parts, dome: _Dome, split: float, travel: float
         parts.add(f"side_key_{k}", solid, press(face, "body", 0.0, 0.0, travel))
 
 
-def _well(rng: Rng, dome: _Dome, split: float) -> tuple[Array, float] | None:
+def _well(draws: Draws, dome: _Dome, split: float) -> tuple[Array, float] | None:
     """Centre (3,) and radius of a ball that is sunk into the back, where there is room for one."""
     back = float(dome.stations[-1])
-    x = split + rng.uniform(0.4, 0.6) * (back - split)
+    x = split + draws.number("ball_place", (0.4, 0.6)) * (back - split)
     height, _, shift = dome.at(x)
     near = np.array([dome.at(x + d) for d in np.linspace(-0.012, 0.012, 5)])
     # The ball stands out by 0.6 radii, and its lower end keeps clear of a floor at 0.2 of the height.
     radius = min((height - 0.2 * float(near[:, 0].max()) - GAP) / 1.4, 0.75 * float(near[:, 1].min()) - 0.003,
-                 0.4 * (back - split), rng.uniform(0.008, 0.02))  # fmt: skip
+                 0.4 * (back - split), draws.length("ball_radius", (0.008, 0.02)))  # fmt: skip
     if radius < 0.006:
         return None
     return np.array([x, shift, height - 0.4 * radius]), radius
