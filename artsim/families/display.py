@@ -9,49 +9,52 @@ import numpy as np
 
 from artsim.common.elementary import arcsin, cos, hypot, sin
 from artsim.families.details import dial
-from artsim.families.keys import Face, add_key, front_face, key_outline
+from artsim.families.keys import Face, add_buttons, add_key, front_face, key_outline
 from artsim.families.screens import Panel, draw_panel, screen
-from artsim.making.assembly import Assembly, JointSpec, Rng, continuous, pick, prismatic, revolute
-from artsim.making.outlines import FRONT, UP, rounded_rectangle
+from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.draws import Draws
+from artsim.making.outlines import FRONT, UP, about, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, ring, rod, tube
 from artsim.model.kinematics import Array
 
 GAP = 0.0015
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """A display; upright and at its lowest, no key pressed at rest."""
     display = Assembly()
-    pick(rng, {_on_stand: 0.58, _on_feet: 0.14, _tube: 0.16, _on_easel: 0.12})(rng, display)
+    kind = draws.pick("kind", {"stand": 0.58, "feet": 0.14, "tube": 0.16, "easel": 0.12})
+    {"stand": _on_stand, "feet": _on_feet, "tube": _tube, "easel": _on_easel}[kind](draws, display)
     return display
 
 
-def _keys(rng: Rng, display: Assembly, parent: str, face: Face, half: float, size: float) -> int:
+def _keys(draws: Draws, display: Assembly, parent: str, face: Face, half: float, size: float) -> int:
     """A row of keys to one side of a chin, on some; returns how many."""
-    if rng.random() < 0.35 or size < 0.004:
+    if not draws.chance("button", 0.65, upper=True) or size < 0.004:
         return 0
-    count = int(rng.integers(1, 7))
-    wide = min(rng.uniform(0.8, 2.5) * size, 0.028)
-    kind = pick(rng, ["round", "square", "pill"])
-    side, travel = float(rng.choice([-1.0, 0.0, 1.0])), rng.uniform(0.0008, 0.0015)
+    count = draws.integer("buttons", 1, 6)
+    wide = min(draws.number("button_width", (0.8, 2.5)) * size, 0.028)
+    kind = draws.pick("button_shape", ["round", "square", "pill"])
+    side = {"left": -1.0, "middle": 0.0, "right": 1.0}[draws.pick("button_side", ["left", "middle", "right"])]
+    travel = draws.length("button_travel", (0.0008, 0.0015))
     pitch = 1.3 * max(wide, size)
     middle = side * (half - 0.5 * count * pitch - 0.01)
     outline = key_outline(kind, (size if kind == "round" else wide, size), 12)
-    for k in range(count):
+    for k, reach in enumerate(draws.numbers("button_reach", 0.0015, 0.004, count, unit="m")):
         u = middle + (k - 0.5 * (count - 1)) * pitch
-        add_key(display, parent, f"button_{k}", face, (u, 0.0), outline, travel + rng.uniform(0.0015, 0.004), travel)
+        add_key(display, parent, f"button_{k}", face, (u, 0.0), outline, travel + reach, travel)
     return count
 
 
-def _foot(rng: Rng, half: float, depth: float, thick: float) -> Solid:
+def _foot(draws: Draws, half: float, depth: float, thick: float) -> Solid:
     """What stands on the table, below z = ``thick``; the middle of it is solid."""
-    kind = pick(rng, {"plate": 0.27, "disc": 0.22, "legs": 0.15, "ring": 0.08, "tapered": 0.18, "arc": 0.1})
+    kind = draws.pick("foot", {"plate": 0.27, "disc": 0.22, "legs": 0.15, "ring": 0.08, "tapered": 0.18, "arc": 0.1})
     back = 0.45 * depth
     front = back - depth
     if kind == "disc":
-        return rod(0, 0, (0, thick), 0.5 * depth, 0.5 * depth * rng.uniform(0.7, 1.0), 32)
+        return rod(0, 0, (0, thick), 0.5 * depth, 0.5 * depth * draws.number("foot_taper", (0.7, 1.0)), 32)
     if kind == "legs":  # two legs that spread to the front
-        width = rng.uniform(0.02, 0.05)
+        width = draws.length("foot_leg_width", (0.02, 0.05))
         solid = box((-0.3 * back, back), 1.5 * width, (0, thick))
         for s in (-1.0, 1.0):
             solid += hull([(x, y, z) for x, y in ((0.5 * back, s * 0.2 * width), (0.5 * back, s * 1.2 * width),
@@ -59,17 +62,19 @@ def _foot(rng: Rng, half: float, depth: float, thick: float) -> Solid:
         return solid
     if kind == "ring":
         outer = 0.5 * depth
-        return ring((0, 0, 0.5 * thick), (0, 0, 1), outer * rng.uniform(0.6, 0.8), outer, thick, 28) + box(
-            (-0.02, -0.95 * outer, 0), (0.03, 0.95 * outer, thick))  # fmt: skip
+        inner = outer * draws.number("foot_hole", (0.6, 0.8))
+        bar = box((-0.02, 0.03), 0.95 * outer, (0, thick))
+        return ring((0, 0, 0.5 * thick), UP, inner, outer, thick, 28) + bar
     if kind == "arc":
-        width = rng.uniform(0.025, 0.05)
+        width = draws.length("foot_leg_width", (0.025, 0.05))
         bows = [
             [(front + 0.6 * (back - front) * a * a + d, half * a, z) for d in (0.0, width) for z in (0.0, thick)]
             for a in np.linspace(-1.0, 1.0, 9)
         ]
         return loft(bows) + box((front + 0.5 * width, 0.6 * back), width, (0, thick))
-    outline = rounded_rectangle((front, -half), (back, half), rng.uniform(0.02, 0.95) * min(half, 0.5 * depth), 4)
-    top = rng.uniform(0.55, 0.9) if kind == "tapered" else rng.uniform(0.96, 1.0)
+    radius = draws.number("foot_corner", (0.02, 0.95)) * min(half, 0.5 * depth)
+    outline = rounded_rectangle((front, -half), (back, half), radius, 4)
+    top = draws.number("foot_taper", (0.55, 0.9) if kind == "tapered" else (0.96, 1.0))
     return hull([(x, y, 0.0) for x, y in outline] + [(x, y, 0.4 * thick) for x, y in outline]
                 + [(top * x, top * y, thick) for x, y in outline])  # fmt: skip
 
@@ -91,37 +96,44 @@ class _Chain:
         return self.display.add(self.name, self.solid, self.joint, density=1500.0)
 
 
-def _on_stand(rng: Rng, display: Assembly) -> None:
+def _on_stand(draws: Draws, display: Assembly) -> None:
     """Screens on a column that turns, slides, tilts and turns to portrait, or some of these."""
-    panel = draw_panel(rng)
-    count = pick(rng, {1: 0.84, 2: 0.1, 3: 0.06}) if not panel.bend and panel.half < 0.3 else 1
-    swivels, slides, tilts, pivots = (bool(v) for v in rng.random(4) < (0.5, 0.45, 0.85, 0.3))
+    panel = draw_panel(draws)
+    count = draws.pick("screens", {1: 0.84, 2: 0.1, 3: 0.06}) if not panel.bend and panel.half < 0.3 else 1
+    swivels, slides = draws.chance("neck", 0.5), draws.chance("slider", 0.45)
+    tilts, pivots = draws.chance("tilts", 0.85), draws.chance("turns_to_portrait", 0.3)
     tilts = tilts or count > 1 or not (swivels or slides)
     pivots = pivots and count == 1 and not panel.bend
     below = float(hypot(panel.half, panel.rise)) if pivots else panel.rise  # how far the panel reaches from its middle
-    radius, knuckle = rng.uniform(0.012, 0.026), rng.uniform(0.006, 0.012)
+    radius, knuckle = draws.length("column_radius", (0.012, 0.026)), draws.length("hinge_radius", (0.006, 0.012))
     front = -radius - (GAP + 0.006 if slides else 0.0)  # of what the hinge is fixed to
     axis = front - knuckle - 0.004
-    plane = axis - knuckle - rng.uniform(0.008, 0.03)  # of the panel's back
+    plane = axis - knuckle - draws.length("hinge_reach", (0.008, 0.03))  # of the panel's back
     forward = _forward_tilt(axis - plane, below, axis, -radius) if tilts else 0.0
-    forward = min(forward, rng.uniform(0.03, 0.12))
-    thick = rng.uniform(0.006, 0.03)
+    forward = min(forward, draws.angle("forward_tilt", (0.03, 0.12)))
+    thick = draws.length("foot_thickness", (0.006, 0.03))
     drop = (axis - plane + panel.thick + panel.bend) * float(sin(forward))
-    middle = thick + below + drop + rng.uniform(0.02, 0.16)
-    half_sleeve = rng.uniform(0.015, 0.035)
-    top = middle + (half_sleeve + rng.uniform(0.0, 0.6) * panel.rise if slides else 0.0)
+    middle = thick + below + drop + draws.length("clearance", (0.02, 0.16))
+    half_sleeve = draws.length("slider_height", (0.015, 0.035))
+    top = middle + (half_sleeve + draws.number("column_height", (0.0, 0.6)) * panel.rise if slides else 0.0)
 
     chain = _Chain(display)
-    chain.solid = _foot(rng, panel.half * rng.uniform(0.35, 0.85), max(panel.half * rng.uniform(0.5, 1.0), 0.13), thick)
+    wide, deep = (
+        panel.half * draws.number("foot_width", (0.35, 0.85)),
+        panel.half * draws.number("foot_depth", (0.5, 1.0)),
+    )
+    chain.solid = _foot(draws, wide, max(deep, 0.13), thick)
     foot = thick
     if swivels:
-        turn = rng.uniform(0.35, 1.57)
+        turn = draws.angle("neck_angle", (0.35, 1.57))
         foot += GAP
         chain.part("neck", revolute("base", (0, 0, 1), (0, 0, foot), -turn, turn))
-        chain.solid = rod(0, 0, (foot, foot + 0.006), rng.uniform(1.6, 2.4) * radius, sections=24)
-    chain.solid += _column(rng, radius, foot + (0.004 if swivels else -0.004), top, not slides)
+        chain.solid = rod(0, 0, (foot, foot + 0.006), draws.number("neck_radius", (1.6, 2.4)) * radius, sections=24)
+    chain.solid += _column(draws, radius, foot + (0.004 if swivels else -0.004), top, not slides)
     if slides:
-        travel = (top - middle) * rng.uniform(0.5, 0.9) + rng.uniform(0.0, half_sleeve)
+        travel = (top - middle) * draws.number("slider_travel", (0.5, 0.9)) + draws.length(
+            "slider_spare", (0.0, half_sleeve)
+        )
         chain.part("slider", prismatic(chain.name, (0, 0, 1), 0.0, travel, (0, 0, middle)))
         outer = radius + GAP + 0.006
         chain.solid = frame(
@@ -142,7 +154,7 @@ def _on_stand(rng: Rng, display: Assembly) -> None:
     back_tilt = _forward_tilt(axis - plane, below, axis, -radius) if slides else 0.5
     for k, y in enumerate(offsets):
         name = "screen" if count == 1 else f"screen_{k}"
-        limits = (-forward, min(back_tilt, rng.uniform(0.15, 0.5)))
+        limits = (-forward, min(back_tilt, draws.angle("back_tilt", (0.15, 0.5))))
         tilt = revolute(parent, (0, 1, 0), (axis, float(y), middle), *limits)
         head = _head(plane + (GAP if pivots else -0.001), axis, float(y), middle, ear, knuckle, panel, tilts)
         if count > 1:
@@ -154,7 +166,7 @@ def _on_stand(rng: Rng, display: Assembly) -> None:
             chain.solid += head
         if pivots:
             chain.part(name, revolute(chain.name, (-1, 0, 0), (plane, 0, middle), -1.5708, 1.5708))
-        _finish_screen(rng, chain, panel, np.array([plane, y, middle]), k)
+        _finish_screen(draws, chain, panel, np.array([plane, y, middle]), k)
 
 
 def _forward_tilt(reach: float, below: float, axis: float, column: float) -> float:
@@ -163,14 +175,15 @@ def _forward_tilt(reach: float, below: float, axis: float, column: float) -> flo
     return max(float(arcsin(min(reach / far, 1.0))) + float(arcsin(min((column - axis - 0.005) / far, 1.0))), 0.01)
 
 
-def _column(rng: Rng, radius: float, low: float, high: float, free: bool) -> Solid:
+def _column(draws: Draws, radius: float, low: float, high: float, free: bool) -> Solid:
     """The upright of a stand; a square one, unless its shape is free."""
-    kind = pick(rng, ["square", "round", "wide", "tapered"]) if free else "square"
+    kind = draws.pick("column", ["square", "round", "wide", "tapered"]) if free else "square"
     if kind == "round":
         return rod(0, 0, (low, high), radius, sections=20)
-    wide = radius * {"square": 1.0, "wide": rng.uniform(1.5, 4.0), "tapered": 1.0}[kind]
-    foot = wide * (rng.uniform(1.2, 4.0) if kind == "tapered" else 1.0)
-    deep = radius if not free else radius * rng.uniform(0.5, 1.0)
+    wide = draws.number("column_width", (1.5, 4.0))
+    wide = radius * wide if kind == "wide" else radius
+    foot = wide * (draws.number("column_spread", (1.2, 4.0)) if kind == "tapered" else 1.0)
+    deep = radius if not free else radius * draws.number("column_depth", (0.5, 1.0))
     return hull(
         [(x, y, z) for z, w in ((low, foot), (high, wide)) for x in (-radius, 2.0 * deep - radius) for y in (-w, w)]
     )
@@ -191,49 +204,49 @@ def _head(
     return solid
 
 
-def _finish_screen(rng: Rng, chain: _Chain, panel: Panel, at: Array, number: int) -> None:
+def _finish_screen(draws: Draws, chain: _Chain, panel: Panel, at: Array, number: int) -> None:
     """Add the panel to the chain's last part, finish that, and put keys on the first one."""
-    chin = rng.uniform(0.0, 0.16) * panel.rise * pick(rng, {0.0: 0.4, 1.0: 0.6})
-    chain.solid += screen(rng, panel, chin).moved(at)
+    chin = draws.number("chin", (0.0, 0.16)) * panel.rise * draws.pick("has_chin", {False: 0.4, True: 0.6})
+    chain.solid += screen(draws, panel, chin).moved(at)
     name = chain.finish()
     if number > 0:
         return
     if chin > 0.012 and not panel.bend:
         face = front_face(float(at[0]) - panel.thick, float(at[1]), float(at[2]) - panel.rise + 0.5 * chin)
-        _keys(rng, chain.display, name, face, 0.9 * panel.half, 0.6 * chin)
+        _keys(draws, chain.display, name, face, 0.9 * panel.half, 0.6 * chin)
     else:  # on the right edge
         face = Face(at + (-0.5 * panel.thick - panel.bend, -panel.half, 0.0), -FRONT, UP)
-        _edge_keys(rng, chain.display, name, face, panel)
+        _edge_keys(draws, chain.display, name, face, panel)
 
 
-def _edge_keys(rng: Rng, display: Assembly, name: str, face: Face, panel: Panel) -> None:
+def _edge_keys(draws: Draws, display: Assembly, name: str, face: Face, panel: Panel) -> None:
     """Keys above one another on an edge, on some."""
     size = min(0.4 * panel.thick, 0.008)
-    if rng.random() < 0.5 or size < 0.002:
+    if not draws.chance("button", 0.5, upper=True) or size < 0.002:
         return
     pitch = 2.6 * size
+    count = min(draws.integer("buttons", 1, 5), int(0.8 * panel.rise / pitch))
     outline = key_outline("pill", (size, 1.8 * size), 8)
-    for k in range(min(int(rng.integers(1, 6)), int(0.8 * panel.rise / pitch))):
-        add_key(display, name, f"button_{k}", face, (0.0, (k - 3.0) * pitch), outline, 0.003, 0.001)
+    add_buttons(display, name, face, [(0.0, (k - 3.0) * pitch) for k in range(count)], outline, 0.003, 0.001)
 
 
-def _on_feet(rng: Rng, display: Assembly) -> None:
+def _on_feet(draws: Draws, display: Assembly) -> None:
     """A television set on two feet that fold in below it."""
-    panel = draw_panel(rng, 1.5)
-    foot = rng.uniform(0.02, 0.1)
+    panel = draw_panel(draws, 1.5)
+    foot = draws.length("foot_height", (0.02, 0.1))
     middle = foot + GAP + panel.rise
     chain = _Chain(display)
     chain.name = "body"
-    _finish_screen(rng, chain, panel, np.array([0.0, 0.0, middle]), 0)
+    _finish_screen(draws, chain, panel, np.array([0.0, 0.0, middle]), 0)
     x = -0.5 * panel.thick
-    spread = panel.half * rng.uniform(0.45, 0.85)
-    reach = min(panel.half * rng.uniform(0.2, 0.5), 0.8 * spread)
-    wide, leg = rng.uniform(0.006, 0.03), min(0.3 * panel.thick, 0.012)
-    limit = rng.uniform(0.8, 1.57)
+    spread = panel.half * draws.number("foot_place", (0.45, 0.85))
+    reach = min(panel.half * draws.number("foot_depth", (0.2, 0.5)), 0.8 * spread)
+    wide, leg = draws.length("foot_width", (0.006, 0.03)), min(0.3 * panel.thick, 0.012)
+    limit = draws.angle("foot_angle", (0.8, 1.57))
     for k, s in enumerate((-1.0, 1.0)):
         y = s * spread
         solid = hull([(x + a * reach, y + b * wide, z) for a in (-1, 1) for b in (-1, 1) for z in (0.0, 0.006)])
-        if rng.random() < 0.5:
+        if draws.chance("foot_slopes", 0.5):
             levels = ((0.8, 0.004), (0.3, foot))
             solid += hull(
                 [(x + a * r * reach * 0.9, y + b * leg, z) for a in (-1, 1) for b in (-1, 1) for r, z in levels]
@@ -243,42 +256,42 @@ def _on_feet(rng: Rng, display: Assembly) -> None:
         display.add(f"foot_{k}", solid, revolute("body", (0, 0, s), (x, y, foot), 0.0, limit), density=2000.0)
 
 
-def _on_easel(rng: Rng, display: Assembly) -> None:
+def _on_easel(draws: Draws, display: Assembly) -> None:
     """A thin panel with a leaf or two legs on its back that fold out."""
-    panel = draw_panel(rng, 0.6)
+    panel = draw_panel(draws, 0.6)
     chain = _Chain(display)
     chain.name = "body"
-    _finish_screen(rng, chain, panel, np.array([0.0, 0.0, panel.rise]), 0)
-    z = 2.0 * panel.rise * rng.uniform(0.3, 0.85)
-    low, thick = 0.04 * panel.rise, rng.uniform(0.002, 0.008)
-    count = int(rng.integers(1, 3))
-    wide = panel.half * (rng.uniform(0.2, 0.85) if count == 1 else rng.uniform(0.04, 0.15))
+    _finish_screen(draws, chain, panel, np.array([0.0, 0.0, panel.rise]), 0)
+    z = 2.0 * panel.rise * draws.number("prop_height", (0.3, 0.85))
+    low, thick = 0.04 * panel.rise, draws.length("prop_thickness", (0.002, 0.008))
+    count = draws.integer("props", 1, 2)
+    wide = panel.half * draws.number("prop_width", (0.2, 0.85) if count == 1 else (0.04, 0.15))
     for k in range(count):
         y = 0.0 if count == 1 else (k - 0.5) * 1.2 * panel.half
-        leaf = box((GAP, GAP + thick), (y - wide, y + wide), (low, z))
-        leaf += rod(GAP + 0.5 * thick, (y - wide, y + wide), z, 0.5 * thick, sections=12)
-        hinge = revolute("body", (0, -1, 0), (GAP + 0.5 * thick, y, z), 0.0, rng.uniform(0.5, 1.6))
+        leaf = box((GAP, GAP + thick), about(y, wide), (low, z))
+        leaf += rod(GAP + 0.5 * thick, about(y, wide), z, 0.5 * thick, sections=12)
+        hinge = revolute("body", (0, -1, 0), (GAP + 0.5 * thick, y, z), 0.0, draws.angle("prop_angle", (0.5, 1.6)))
         display.add("stand" if count == 1 else f"leg_{k}", leaf, hinge, density=1500.0)
 
 
-def _tube(rng: Rng, display: Assembly) -> None:
+def _tube(draws: Draws, display: Assembly) -> None:
     """A deep set with a picture tube, on a swivel, or a television set on legs with knobs and rabbit ears."""
-    half, ratio = rng.uniform(0.14, 0.38), rng.uniform(0.7, 1.05)
-    rise, depth = half * ratio, half * rng.uniform(1.2, 2.3)
-    cabinet = depth * rng.uniform(0.2, 0.6)
-    foot = rng.uniform(0.02, 0.07)
+    half = 0.5 * draws.length("width", (0.28, 0.76))
+    rise, depth = half * draws.number("height", (0.7, 1.05)), half * draws.number("depth", (1.2, 2.3))
+    cabinet = depth * draws.number("cabinet_depth", (0.2, 0.6))
+    foot = draws.length("foot_height", (0.02, 0.07))
     chain = _Chain(display)
-    swivels = rng.random() < 0.65
+    swivels = draws.chance("swivels", 0.65)
     if swivels:
         thick = 0.4 * foot
-        chain.solid = _foot(rng, 0.6 * half, rng.uniform(0.8, 1.3) * half, thick)
-        turn = rng.uniform(0.5, 1.57)
+        chain.solid = _foot(draws, 0.6 * half, draws.number("foot_depth", (0.8, 1.3)) * half, thick)
+        turn = draws.angle("swivel_angle", (0.5, 1.57))
         chain.part("screen", revolute("base", (0, 0, 1), (0, 0, thick), -turn, turn))
         chain.solid = rod(0, 0, (thick + GAP, foot + 0.004), 0.35 * half, 0.5 * half, 24)
     else:
         chain.name = "body"
-        splay = rng.uniform(1.0, 1.3)
-        leg = rng.uniform(0.008, 0.02)
+        splay = draws.number("leg_splay", (1.0, 1.3))
+        leg = draws.length("leg_radius", (0.008, 0.02))
         x0 = -0.5 * cabinet
         for a, s in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
             tip = (x0 + a * splay * 0.4 * cabinet, s * splay * 0.75 * half, 0.0)
@@ -286,46 +299,48 @@ def _tube(rng: Rng, display: Assembly) -> None:
             chain.solid += cylinder(tip, head, 0.7 * leg, leg, 12)
     front = -0.5 * cabinet - 0.2 * depth if swivels else -cabinet
     low, high = foot, foot + 2.0 * rise
-    rim = rng.uniform(0.06, 0.16) * half
-    side = rng.uniform(0.3, 0.6) * half if rng.random() < 0.4 else 0.0  # a strip for knobs, on the right
-    chin = rng.uniform(0.1, 0.3) * rise if side == 0 else 0.0
-    lip = rng.uniform(0.006, 0.02)
-    shell = box((front + lip, front + cabinet), half, (low, high), fillet=rng.uniform(0.02, 0.2) * rise, axis=0)
+    rim = draws.number("rim", (0.06, 0.16)) * half
+    # A strip for knobs, on the right.
+    side = draws.number("knob_strip", (0.3, 0.6)) * half if draws.chance("knob", 0.4) else 0.0
+    chin = draws.number("chin", (0.1, 0.3)) * rise if side == 0 else 0.0
+    lip = draws.length("lip", (0.006, 0.02))
+    corner = draws.number("corner", (0.02, 0.2)) * rise
+    shell = box((front + lip, front + cabinet), half, (low, high), fillet=corner, axis=0)
     inset = 0.08 * rise
     corners = (front, inset - half, low + inset), (front + lip + 0.001, half - inset, high - inset)
     shell += frame(*corners, [rim + side, rim, rim + chin, rim])
-    shrink = rng.uniform(0.4, 0.8)
+    shrink = draws.number("back_taper", (0.4, 0.8))
     shell += hull([(x, s * half * 0.96 * t, z) for x, t in ((front + cabinet - 0.001, 1.0), (front + depth, shrink))
                    for s in (-1, 1) for z in (low + 0.02 * rise, low + rise * (1.0 + 0.96 * t))])  # fmt: skip
     glass = np.array([front + lip, 0.5 * side, low + rise + 0.5 * chin])
     half_glass, rise_glass = half - inset - rim - 0.5 * side, rise - inset - rim - 0.5 * chin
     bulge = ((0.001, 0.98), (-0.3 * lip, 0.8), (-0.5 * lip, 0.4))
     corners_of_glass = [(x, s * half_glass * t, u * rise_glass * t) for x, t in bulge for s in (-1, 1) for u in (-1, 1)]
-    shell += hull([glass + corner for corner in corners_of_glass])
+    shell += hull([glass + corner for corner in corners_of_glass]).called("display", FRONT)
     chain.solid += shell
     name, keys = chain.finish(), 0
     if side:
         face = front_face(front, inset + 0.5 * (side + rim) - half, low + rise)
-        for k in range(int(rng.integers(1, 4))):
+        for k in range(draws.integer("knobs", 1, 3)):
             size = min(0.3 * side, 0.2 * rise)
             center = face.at(0.0, (0.65 - 0.5 * k) * rise)
-            knob = dial(center, FRONT, rng.uniform(0.6, 1.2) * size, size, 18)
+            knob = dial(center, FRONT, draws.number("knob_reach", (0.6, 1.2)) * size, size, 18)
             display.add(f"knob_{k}", knob, continuous(name, FRONT, tuple(center)), density=900.0)
     else:
         face = front_face(front, 0.0, low + inset + 0.5 * (chin + rim))
-        keys = _keys(rng, display, name, face, half - inset, 0.5 * (chin + rim))
-    if rng.random() < 0.4 or not (swivels or side or keys):
-        _rabbit_ears(rng, display, name, np.array([front + 0.6 * cabinet, 0.0, high]), half)
+        keys = _keys(draws, display, name, face, half - inset, 0.5 * (chin + rim))
+    if draws.chance("antenna", 0.4) or not (swivels or side or keys):
+        _rabbit_ears(draws, display, name, np.array([front + 0.6 * cabinet, 0.0, high]), half)
 
 
-def _rabbit_ears(rng: Rng, display: Assembly, parent: str, foot: Array, half: float) -> None:
+def _rabbit_ears(draws: Draws, display: Assembly, parent: str, foot: Array, half: float) -> None:
     """Two rods that turn about a block's axes."""
-    length, lean = half * rng.uniform(0.8, 2.2), rng.uniform(0.25, 0.6)
+    length, lean = half * draws.number("antenna_length", (0.8, 2.2)), draws.angle("antenna_lean", (0.25, 0.6))
     for k, s in enumerate((-1.0, 1.0)):
         pivot = foot + (0.0, s * 0.05, 0.012)
         tip = pivot + length * np.array([0.0, s * float(sin(lean)), float(cos(lean))])
         ear = tube([pivot, tip], [0.003, 0.0018], 8) + cylinder(
             pivot - (0.007, 0, 0), pivot + (0.007, 0, 0), 0.008, sections=12
         )
-        hinge = revolute(parent, (s, 0, 0), tuple(pivot), -rng.uniform(0.3, 0.8), lean * 0.8)
+        hinge = revolute(parent, (s, 0, 0), tuple(pivot), -draws.angle("antenna_angle", (0.3, 0.8)), lean * 0.8)
         display.add(f"antenna_{k}", ear, hinge, density=3000.0)
