@@ -9,7 +9,7 @@ import numpy as np
 
 from artsim.common.elementary import arcsin, cos, hypot, sin
 from artsim.families.details import dial
-from artsim.families.keys import Face, add_buttons, add_key, front_face, key_outline
+from artsim.families.keys import Face, add_buttons, add_key, front_face, key_outline, pill
 from artsim.families.screens import Panel, draw_panel, screen
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
 from artsim.making.draws import Draws
@@ -226,8 +226,8 @@ def _edge_keys(draws: Draws, display: Assembly, name: str, face: Face, panel: Pa
         return
     pitch = 2.6 * size
     count = min(draws.integer("buttons", 1, 5), int(0.8 * panel.rise / pitch))
-    outline = key_outline("pill", (size, 1.8 * size), 8)
-    add_buttons(display, name, face, [(0.0, (k - 3.0) * pitch) for k in range(count)], outline, 0.003, 0.001)
+    spots = [(0.0, (k - 3.0) * pitch) for k in range(count)]
+    add_buttons(display, name, face, spots, pill(size, 1.8 * size), 0.003, 0.001)
 
 
 def _on_feet(draws: Draws, display: Assembly) -> None:

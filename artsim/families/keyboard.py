@@ -1,8 +1,7 @@
 """Keyboards and keypads that lie flat, the space bar towards -X: every key or every row of keys travels down.
 
-What varies: the kind (full, compact, number pad, macro pad, split halves on a pivot, halves that fold together, angled
-halves); pitch, rows, columns, wide keys, height and shape of the caps, stepped rows; thickness and slope of the body,
-its outline, rims, strips of media keys; feet that fold out, knobs, rollers, faders, wrist rests, cables.
+What varies: the kind, of one body or of two halves; layout and caps of the keys; outline, thickness and slope of the
+body; feet that fold out, knobs, faders, wrist rests, cables.
 """
 
 from collections.abc import Iterable, Sequence
@@ -15,7 +14,7 @@ from artsim.common.products import dot, unit
 from artsim.families import key_layouts
 from artsim.families.details import dial, drawn_from
 from artsim.families.key_layouts import Cell, extent
-from artsim.families.keys import CLEAR, Face, key, key_outline, press, top_face
+from artsim.families.keys import CLEAR, Face, key, key_outline, pill, press, top_face
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
 from artsim.making.outlines import about, rounded_rectangle
@@ -146,16 +145,12 @@ def _pads(low: Array, high: Array, height: float, feet: bool) -> Solid:
     return union(box((x - size, x + size), (-u - size, -u + size), (0.0, height + 0.001)) for x, u in spots)
 
 
-def _slab(face: Face, low: Sequence[float], high: Sequence[float], heights: tuple[float, float]) -> Solid:
-    """A block on a face between two corners (u, v) and two heights."""
-    return hull([face.at(u, v, h) for u in (low[0], high[0]) for v in (low[1], high[1]) for h in heights])
-
-
 def _rim(face: Face, low: Array, high: Array, wide: float, height: float) -> Solid:
     """A raised border around the deck."""
-    spans = [((low[0], low[1]), (high[0], low[1] + wide)), ((low[0], high[1] - wide), (high[0], high[1])),
-             ((low[0], low[1]), (low[0] + wide, high[1])), ((high[0] - wide, low[1]), (high[0], high[1]))]  # fmt: skip
-    return union(_slab(face, a, b, (-0.0005, height)) for a, b in spans)
+    (u0, v0), (u1, v1) = low, high
+    sides = [((u0, u1), (v0, v0 + wide)), ((u0, u1), (v1 - wide, v1)),
+             ((u0, u0 + wide), (v0, v1)), ((u1 - wide, u1), (v0, v1))]  # fmt: skip
+    return union(hull([face.at(u, v, h) for u in us for v in vs for h in (-0.0005, height)]) for us, vs in sides)
 
 
 def _trimmings(draws: Draws, face: Face, low: Array, high: Array, level: float) -> Solid:
@@ -192,11 +187,8 @@ def _controls(
             solid = dial(center, face.outward, reach, min(0.42 * room, 0.014), 18)
             keyboard.add(f"knob_{k}", solid, continuous("body", face.outward, tuple(center)), density=1200.0)
         else:
-            outline = key_outline("pill", (0.35 * room, 0.3 * room), 8)
-            start = v - 0.3 * room
-            solid = key(
-                face, u, start, outline, 0.0006, min(draws.number("slider_reach", (0.3, 0.5)) * room, 0.007), 0.2
-            )
+            start, reach = v - 0.3 * room, min(draws.number("slider_reach", (0.3, 0.5)) * room, 0.007)
+            solid = key(face, u, start, pill(0.35 * room, 0.3 * room), 0.0006, reach, 0.2)
             slide = prismatic("body", face.up, 0.0, 0.6 * room, tuple(face.at(u, start)))
             keyboard.add(f"slider_{k}", solid, slide, density=1200.0)
 
@@ -209,7 +201,7 @@ def _feet(draws: Draws, keyboard: Assembly, low: Array, high: Array, room: float
     x, z = high[1] * 0.88, GAP + 0.5 * thick
     limit = draws.angle("angle", (1.1, 1.7))
     for k, share in enumerate((-0.33, 0.33)):
-        y = -0.5 * (low[0] + high[0]) + share * (high[0] - low[0])
+        y = share * (high[0] - low[0]) - 0.5 * (low[0] + high[0])
         across = about(y, 0.5 * wide)
         solid = box((x - length, x), across, (GAP, GAP + thick)) + rod(x, across, z, 0.5 * thick, sections=10)
         keyboard.add(f"foot_{k}", solid, revolute("body", (0, -1, 0), (x, y, z), 0.0, limit), density=1000.0)

@@ -1,15 +1,14 @@
-"""Keys and buttons on flat faces, and bodies of varying cross-section, as handheld and desktop devices have them."""
+"""Keys and buttons on flat faces, of handheld and desktop devices."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, JointSpec, prismatic
 from artsim.making.draws import Draws
-from artsim.making.outlines import Vector, lifted, rounded_rectangle
+from artsim.making.outlines import Vector, rounded_rectangle
 from artsim.making.solids import Solid, hull, prism, union
 from artsim.model.kinematics import Array
 
@@ -53,6 +52,11 @@ def top_face(z: float, x: float = 0.0, y: float = 0.0) -> Face:
     return Face(np.array([x, y, z]), np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0]))
 
 
+def side_face(side: float, x: float, y: float, z: float) -> Face:
+    """A face that looks to the left (1) or to the right (-1) of who stands before the front: v is along Z."""
+    return Face(np.array([x, y, z]), np.array([-side, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+
+
 def key_outline(kind: str, size: Vector, sections: int = 12) -> Array:
     """(N, 2) outline about 0 of a key of a size along u and v: "square", "pill" (round corners), "round", "diamond"."""
     half = 0.5 * np.asarray(size, dtype=np.float64)
@@ -64,6 +68,11 @@ def key_outline(kind: str, size: Vector, sections: int = 12) -> Array:
     if kind == "pill":
         return rounded_rectangle(-half, half, 0.45 * float(half.min()), 2)
     return np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]) * half
+
+
+def pill(u: float, v: float) -> Array:
+    """Outline of a small key with round corners, so long along u and v."""
+    return key_outline("pill", (u, v), 8)
 
 
 def key(face: Face, u: float, v: float, outline: Array, low: float, high: float, shrink: float = 0.1) -> Solid:
@@ -151,30 +160,7 @@ def sleeve(low: Vector, high: Vector, hole_low: Vector, hole_high: Vector, radiu
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     walls = np.minimum(np.asarray(hole_low) - low[1:], high[1:] - np.asarray(hole_high))
     outer = rounded_rectangle(low[1:], high[1:], min(radius, 3.0 * float(walls.min())), steps)
-    inner = np.repeat(_corners(hole_low, hole_high), steps + 1, axis=0)
-    pieces = []
-    for k in range(len(outer)):
-        outline = np.concatenate([outer[[k - 1, k]], inner[[k - 1, k]]])
-        pieces.append(prism(outline, low[0], high[0], 0))
-    return union(pieces)
-
-
-def _corners(low: Vector, high: Vector) -> Array:
-    """(4, 2) corners of a rectangle, in the order of :func:`artsim.making.solids.rounded_rectangle`."""
-    return np.array([(high[0], high[1]), (low[0], high[1]), (low[0], low[1]), (high[0], low[1])])
-
-
-def cross_sections(levels: ArrayLike, fronts: ArrayLike, backs: ArrayLike, halves: ArrayLike, roundness: float,
-                   steps: int = 2) -> list[Array]:  # fmt: skip
-    """Rounded rectangles across the Z axis at heights ``levels``, to loft an upright body from.
-
-    Each reaches from x = front to back and to y = half at either side; ``roundness`` is the radius of its edges over
-    half of its thickness, at most 1.
-    """
-    rings = []
-    rows = np.stack(np.broadcast_arrays(levels, fronts, backs, halves), axis=1)
-    for z, front, back, half in rows:
-        radius = roundness * 0.5 * min(back - front, 2.0 * half)
-        plane = rounded_rectangle((front, -half), (back, half), radius, steps)
-        rings.append(lifted(plane, z))
-    return rings
+    (y0, z0), (y1, z1) = hole_low, hole_high
+    inner = np.repeat([(y1, z1), (y0, z1), (y0, z0), (y1, z0)], steps + 1, axis=0)
+    pairs = zip(np.roll(outer, 1, axis=0), outer, np.roll(inner, 1, axis=0), inner, strict=True)
+    return union(prism(np.array(pair), low[0], high[0], 0) for pair in pairs)

@@ -1,7 +1,6 @@
 """Computer mice that lie on a table, their buttons towards -X.
 
-What varies: length, width, height, where the hump is, waist and ends, how steep the sides are; one, two or three
-buttons; a wheel between them, keys on the side and on top, a ball to turn; the roll of upright mice; glides, a cable.
+What varies: the dome's outline and sides; buttons, a wheel, keys on the side and on top, a ball; the roll; a cable.
 """
 
 from dataclasses import replace
@@ -11,7 +10,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.common.products import apply
 from artsim.families.details import holed_plate
-from artsim.families.keys import Face, key, key_outline, press, top_face
+from artsim.families.keys import add_key, pill, side_face, top_face
 from artsim.making.assembly import Assembly, JointSpec, continuous, revolute
 from artsim.making.draws import Draws
 from artsim.making.solids import Solid, cylinder, ellipsoid, hull, loft, rod, tube, union
@@ -19,6 +18,8 @@ from artsim.model.kinematics import Array
 from artsim.model.transforms import rotation_about
 
 GAP = 0.0007
+TRAVEL = 0.0007
+"""Of keys, metres."""
 
 
 class _Dome:
@@ -40,19 +41,16 @@ class _Dome:
         waist = waist * np.maximum(1.0 - np.square((share - 0.42) / 0.3), 0.0)
         slant = draws.number("slant", (-0.25, 0.25)) * draws.pick("slanted", [False, True]) * half
         self.stations = length * (share - 0.5)
+        self.front, self.back = float(self.stations[0]), float(self.stations[-1])
         self.heights, self.halves = height * profile, half * (widths - waist)
         self.shifts = slant * np.maximum(1.0 - np.square((share - 0.5) / 0.5), 0.0)
         self.steep = draws.number("steepness", (0.0, 1.0))  # 0 for a round cross-section, 1 for one with upright sides
-        self.shoulder = draws.number(
-            "shoulder", (0.15, 0.55)
-        )  # share of the height up to which the sides stand upright
+        self.shoulder = draws.number("shoulder", (0.15, 0.55))  # share of the height up to which sides are upright
 
     def at(self, x: float) -> tuple[float, float, float]:
         """Height, half width and shift at x."""
-        height, half, shift = (
-            float(np.interp(x, self.stations, row)) for row in (self.heights, self.halves, self.shifts)
-        )
-        return height, half, shift
+        rows = (self.heights, self.halves, self.shifts)
+        return tuple(float(np.interp(x, self.stations, row)) for row in rows)  # type: ignore[return-value]
 
     def cut(
         self, x: float, y: tuple[float, float] = (-1.0, 1.0), low: float = 0.0, share: float = 1.0, drop: float = 0.0
@@ -65,9 +63,8 @@ class _Dome:
         angles = np.linspace(0.0, np.pi, 9)
         c, s = cos(angles), sin(angles)
         across = (1.0 - self.steep) * c + self.steep * np.sign(c) * np.sqrt(np.abs(c))
-        rise = self.shoulder + (1.0 - self.shoulder) * (
-            (1.0 - self.steep) * s + self.steep * np.sqrt(np.maximum(s, 0.0))
-        )
+        rise = (1.0 - self.steep) * s + self.steep * np.sqrt(np.maximum(s, 0.0))
+        rise = self.shoulder + (1.0 - self.shoulder) * rise
         plane = np.column_stack([shift + half * across, height * rise])
         foot = 0.94 * half
         plane = np.concatenate([plane, [(shift - half, 0.12 * height), (shift - foot, 0.0), (shift + foot, 0.0),
@@ -90,51 +87,43 @@ def build(draws: Draws) -> Assembly:
         way = draws.pick("upright_hand", {"right": 0.85, "left": 0.15})
         roll = {"right": -1.0, "left": 1.0}[way] * draws.angle("roll", (0.25, 0.85))
         turn = rotation_about((1.0, 0.0, 0.0), roll)
-    parts = _Parts(turn)
-    _shell(draws, parts, dome)
-    if parts.turn is not None:
+    mouse = _Mouse(turn)
+    _shell(draws, mouse, dome)
+    if turn is not None:
         # An upright mouse stands on what is between its own bottom and the table.
         bottom = np.concatenate([ring[ring[:, 2] <= 0.0] for ring in map(dome.cut, dome.stations)])
-        edge = np.stack([apply(parts.turn, point) for point in bottom])
+        edge = np.stack([apply(turn, point) for point in bottom])
         floor = float(edge[:, 2].min()) - draws.length("foot_height", (0.001, 0.006))
         middle = edge.mean(axis=0)
         shadow = middle + (edge - middle) * (1.0, draws.number("foot_width", (1.0, 1.4)), 0.0)
         shadow[:, 2] = floor
-        parts.foot = hull(np.concatenate([edge, shadow]))
-    return parts.assembly()
+        mouse.body += hull(np.concatenate([edge, shadow]))
+    return mouse
 
 
-class _Parts:
-    """Parts of a mouse that is rolled about X once it is complete, and the foot that its rolled body stands on."""
+class _Mouse(Assembly):
+    """An assembly whose parts are rolled about X as they are added; all are of one plastic."""
 
     def __init__(self, turn: Array | None) -> None:
+        super().__init__(density=900.0)
         self.turn = turn
-        self.foot = Solid()
-        self.items: list[tuple[str, Solid, JointSpec | None]] = []
 
-    def add(self, name: str, solid: Solid, joint: JointSpec | None = None) -> None:
+    def add(
+        self, name: str, solid: Solid, joint: JointSpec | None = None, label: str | None = None,
+        density: float | None = None,
+    ) -> str:  # fmt: skip
         """Add a part as it stands before the roll."""
-        self.items.append((name, solid, joint))
-
-    def assembly(self) -> Assembly:
-        """All parts, rolled."""
-        mouse = Assembly()
-        for name, solid, joint in self.items:
-            if self.turn is not None:
-                solid = solid.rotated(self.turn)
-                if joint is not None:
-                    axis, origin = (
-                        apply(self.turn, np.asarray(v, dtype=np.float64)) for v in (joint.axis, joint.origin)
-                    )
-                    joint = replace(joint, axis=axis, origin=origin)
-            mouse.add(name, solid if joint is not None else solid + self.foot, joint, density=900.0)
-        return mouse
+        if self.turn is not None:
+            solid = solid.rotated(self.turn)
+            if joint is not None:
+                axis, origin = (apply(self.turn, np.asarray(v, dtype=np.float64)) for v in (joint.axis, joint.origin))
+                joint = replace(joint, axis=axis, origin=origin)
+        return super().add(name, solid, joint, label)
 
 
-def _shell(draws: Draws, parts: _Parts, dome: _Dome) -> None:
+def _shell(draws: Draws, mouse: _Mouse, dome: _Dome) -> None:
     """Body, buttons and what sits between them."""
-    front, back = float(dome.stations[0]), float(dome.stations[-1])
-    length = back - front
+    front, length = dome.front, dome.back - dome.front
     split = front + draws.number("button_length", (0.33, 0.62)) * length
     floor = draws.number("button_bottom", (0.3, 0.55))
     count = draws.pick("buttons", {1: 0.15, 2: 0.65, 3: 0.2})
@@ -164,10 +153,10 @@ def _shell(draws: Draws, parts: _Parts, dome: _Dome) -> None:
             gaps = [(gaps[0][0], x - radius - 0.001), (x + radius + 0.001, gaps[0][1])]
         body += union(dome.between(a, b, between, 0.0, 0.98, 0.0004) for a, b in gaps if b > a + 0.002)
     body += _underside(draws, dome)
-    parts.add("body", body)
+    mouse.add("body", body)
     for name, span in list(spans.items())[:count]:
         solid = dome.between(front, edge, span, floor + room)
-        parts.add(name, solid, revolute("body", (0, -1, 0), (edge, 0, hinge_z), 0.0, angle))
+        mouse.add(name, solid, revolute("body", (0, -1, 0), (edge, 0, hinge_z), 0.0, angle))
     if wheel is not None:
         x, z, radius, wide = wheel
         solid = rod(x, (drift - wide, drift + wide), z, radius, sections=20)
@@ -175,18 +164,26 @@ def _shell(draws: Draws, parts: _Parts, dome: _Dome) -> None:
             for a in np.arange(10) * 0.2 * np.pi:
                 at, side = np.array([x + 0.97 * radius * cos(a), drift, z + 0.97 * radius * sin(a)]), (0, 0.9 * wide, 0)
                 solid += cylinder(at - side, at + side, 0.09 * radius, sections=5)
-        parts.add("wheel", solid, continuous("body", (0, 1, 0), (x, drift, z)))
+        mouse.add("wheel", solid, continuous("body", (0, 1, 0), (x, drift, z)))
     if ball is not None:
-        solid = ellipsoid(ball[0], ball[1], 20)
-        parts.add("ball", solid, continuous("body", (0, 1, 0), tuple(ball[0])))
-    _extras(draws, parts, dome, split, ball is None)
+        mouse.add("ball", ellipsoid(*ball, 20), continuous("body", (0, 1, 0), tuple(ball[0])))
+    if draws.chance("side_key", 0.4):
+        _side_keys(draws, mouse, dome, split)
+    start = split + 0.04 * length  # of keys on top, where that is free
+    if ball is None and start + 0.25 * length <= dome.back and draws.chance("key", 0.35, upper=True):
+        wide = min(draws.length("key_width", (0.004, 0.009)), 0.4 * float(dome.halves.max()))
+        top = float(max(dome.at(x)[0] for x in np.linspace(start, start + 0.16 * length, 7)))
+        for k in range(draws.integer("keys", 1, 2)):
+            face = top_face(top, start + (0.04 + 0.075 * k) * length, dome.at(start)[2])
+            outline = pill(wide, 0.055 * length)
+            add_key(mouse, "body", f"key_{k}", face, (0.0, 0.0), outline, TRAVEL + 0.0016, TRAVEL)
 
 
 def _wheel(
     draws: Draws, dome: _Dome, y: float, slot: float, split: float, floor: float
 ) -> tuple[float, float, float, float] | None:
     """X and Z of the axle, radius and half of the width of a wheel between the buttons."""
-    front = float(dome.stations[0])
+    front = dome.front
     x = front + draws.number("wheel_place", (0.35, 0.7)) * (split - front)
     height = dome.at(x)[0]
     proud = draws.length("wheel_height", (0.0015, 0.005))
@@ -201,14 +198,13 @@ def _wheel(
 
 def _underside(draws: Draws, dome: _Dome) -> Solid:
     """Glides below and a cable in front, on some."""
-    front, back = float(dome.stations[0]), float(dome.stations[-1])
+    front = dome.front
     solid = Solid()
     if draws.chance("glides", 0.5):
-        for x in (0.7 * front, 0.7 * back):
-            half, shift = 0.6 * dome.at(x)[1], dome.at(x)[2]
-            solid += hull(
-                [(x + a * 0.006, shift + b * half, z) for a in (-1, 1) for b in (-1, 1) for z in (-0.0008, 0.001)]
-            )
+        for x in (0.7 * front, 0.7 * dome.back):
+            _, half, shift = dome.at(x)
+            spots = [(x + a * 0.006, shift + b * (0.6 * half)) for a in (-1, 1) for b in (-1, 1)]
+            solid += hull([(*spot, z) for spot in spots for z in (-0.0008, 0.001)])
     if draws.chance("cable", 0.45):
         height, _, shift = dome.at(front)
         z, radius = 0.14 * height + 0.001, min(draws.length("cable_radius", (0.0012, 0.0025)), 0.12 * height)
@@ -219,47 +215,25 @@ def _underside(draws: Draws, dome: _Dome) -> Solid:
     return solid
 
 
-def _extras(draws: Draws, parts: _Parts, dome: _Dome, split: float, free: bool) -> None:
-    """Keys on the side, and on top where that is free."""
-    length = float(dome.stations[-1] - dome.stations[0])
-    travel = 0.0007
-    if draws.chance("side_key", 0.4):
-        _side_keys(draws, parts, dome, split, travel)
-    start = split + 0.04 * length
-    if not free or start + 0.25 * length > dome.stations[-1] or not draws.chance("key", 0.35, upper=True):
-        return
-    wide = min(draws.length("key_width", (0.004, 0.009)), 0.4 * float(dome.halves.max()))
-    top = float(max(dome.at(x)[0] for x in np.linspace(start, start + 0.16 * length, 7)))
-    for k in range(draws.integer("keys", 1, 2)):
-        face = top_face(top, start + (0.04 + 0.075 * k) * length, dome.at(start)[2])
-        outline = key_outline("pill", (wide, 0.055 * length), 8)
-        solid = key(face, 0.0, 0.0, outline, travel + 0.0003, travel + 0.0016)
-        parts.add(f"key_{k}", solid, press(face, "body", 0.0, 0.0, travel))
-
-
-def _side_keys(draws: Draws, parts: _Parts, dome: _Dome, split: float, travel: float) -> None:
+def _side_keys(draws: Draws, mouse: _Mouse, dome: _Dome, split: float) -> None:
     """Keys for the thumb, on the left (+Y)."""
-    back = float(dome.stations[-1])
     count = draws.integer("side_keys", 1, 3)
-    span = (split + 0.002, split + 0.55 * (back - split))
+    span = (split + 0.002, split + 0.55 * (dome.back - split))
     pitch = (span[1] - span[0]) / count
-    inside = np.linspace(*span, 9)
-    rows = np.array([dome.at(x) for x in inside])
+    rows = np.array([dome.at(x) for x in np.linspace(*span, 9)])
     side = float((rows[:, 1] + rows[:, 2]).max())
     low, high = 0.16 * float(rows[:, 0].min()), dome.shoulder * float(rows[:, 0].min())
     if high - low < 0.003:
         return
     for k in range(count):
-        face = Face(np.array([span[0] + (k + 0.5) * pitch, side, 0.5 * (low + high)]), np.array([-1.0, 0.0, 0.0]),
-                    np.array([0.0, 0.0, 1.0]))  # fmt: skip
-        outline = key_outline("pill", (0.85 * pitch, 0.9 * (high - low)), 8)
-        solid = key(face, 0.0, 0.0, outline, travel + 0.0003, travel + 0.0018, 0.15)
-        parts.add(f"side_key_{k}", solid, press(face, "body", 0.0, 0.0, travel))
+        face = side_face(1.0, span[0] + (k + 0.5) * pitch, side, 0.5 * (low + high))
+        outline = pill(0.85 * pitch, 0.9 * (high - low))
+        add_key(mouse, "body", f"side_key_{k}", face, (0.0, 0.0), outline, TRAVEL + 0.0018, TRAVEL, 0.15)
 
 
 def _well(draws: Draws, dome: _Dome, split: float) -> tuple[Array, float] | None:
     """Centre (3,) and radius of a ball that is sunk into the back, where there is room for one."""
-    back = float(dome.stations[-1])
+    back = dome.back
     x = split + draws.number("ball_place", (0.4, 0.6)) * (back - split)
     height, _, shift = dome.at(x)
     near = np.array([dome.at(x + d) for d in np.linspace(-0.012, 0.012, 5)])
@@ -273,12 +247,11 @@ def _well(draws: Draws, dome: _Dome, split: float) -> tuple[Array, float] | None
 
 def _rear(dome: _Dome, split: float, ball: tuple[Array, float] | None) -> Solid:
     """The body behind the buttons, with a well for a ball."""
-    back = float(dome.stations[-1])
     if ball is None:
-        return dome.between(split, back)
+        return dome.between(split, dome.back)
     (x, y, _), radius = ball
     room = radius + GAP
-    solid = dome.between(split, x - room) + dome.between(x + room, back)
+    solid = dome.between(split, x - room) + dome.between(x + room, dome.back)
     first, last = x - room - 1e-4, x + room + 1e-4
     solid += dome.between(first, last, (-1.0, 1.0), 0.0, 0.2)
     solid += dome.between(first, last, (y + room, 1.0)) + dome.between(first, last, (-1.0, y - room))

@@ -11,10 +11,10 @@ import numpy as np
 
 from artsim.families.desk_phone import desk_set
 from artsim.families.details import drawn_side
-from artsim.families.keys import Face, add_function_keys, add_key, add_keypad, cross_sections, front_face, key_outline
+from artsim.families.keys import add_function_keys, add_key, add_keypad, front_face, pill, side_face, top_face
 from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, about, lifted
+from artsim.making.outlines import FRONT, about, cross_sections, lifted
 from artsim.making.solids import Solid, box, hull, loft, rod, union
 
 GAP = 0.0005
@@ -52,13 +52,12 @@ def _side_keys(draws: Draws, phone: Assembly, half: float, x: float, z: tuple[fl
                thick: float, sides: Sequence[float] = (-1.0, 1.0)) -> None:  # fmt: skip
     """Keys on the right (-1) and left (1) edges of an upright body."""
     for side in sides:
-        face = Face(np.array([x, side * half, 0.0]), np.array([-side, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+        face = side_face(side, x, side * half, 0.0)
         name = "left_key" if side > 0 else "right_key"
         for k in range(draws.integer(f"{name}s", 0, 2)):
             v = z[0] + (0.62 + 0.14 * k) * (z[1] - z[0])
             long = draws.number(f"{name}_length", (0.05, 0.11)) * (z[1] - z[0])
-            outline = key_outline("pill", (0.3 * thick, long), 8)
-            add_key(phone, "body", f"{name}_{k}", face, (0.0, v), outline, 0.0014, 0.0004)
+            add_key(phone, "body", f"{name}_{k}", face, (0.0, v), pill(0.3 * thick, long), 0.0014, 0.0004)
 
 
 def _size(draws: Draws) -> tuple[float, float, float]:
@@ -235,8 +234,7 @@ def _smartphone(draws: Draws, phone: Assembly) -> None:
         upright = 0.02 * length, (chin - 0.02) * length
         add_function_keys(draws, phone, "body", front_face(0.0), 0.8 * half, upright, 0.0013, 0)
     else:
-        face = Face(np.array([0.5 * thick, 0.0, length]), np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0]))
-        outline = key_outline("pill", (0.25 * half, 0.3 * thick), 8)
+        face, outline = top_face(length, 0.5 * thick), pill(0.25 * half, 0.3 * thick)
         add_key(phone, "body", "button_0", face, (0.6 * half, 0.0), outline, 0.0013, 0.0004)
     _side_keys(draws, phone, half, 0.5 * thick, (0.0, length), thick)
     _stand(draws, phone, half, thick + 0.0045, length)

@@ -9,9 +9,10 @@ import numpy as np
 
 from artsim.common.elementary import exp, sin
 from artsim.families.details import dial
-from artsim.families.keys import Face, add_buttons, add_key, cross_sections, front_face, key, key_cells, key_outline
+from artsim.families.keys import Face, add_buttons, add_key, front_face, key, key_cells, key_outline, pill
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
+from artsim.making.outlines import cross_sections
 from artsim.making.solids import Solid, box, loft, ring, rod
 from artsim.model.kinematics import Array
 
@@ -140,7 +141,7 @@ def _keys(draws: Draws, remote: Assembly, body: _Body) -> float:
             added = _pad(draws, remote, face, top - 0.5 * deep, 0.46 * deep, height, travel)
             tallest = max(tallest, added)
         elif band == "slider":
-            outline, start = key_outline("pill", (min(half, 1.6 * pitch), 0.8 * pitch), 8), top - deep + 0.5 * pitch
+            outline, start = pill(min(half, 1.6 * pitch), 0.8 * pitch), top - deep + 0.5 * pitch
             slide = prismatic("body", (0, 0, 1), 0.0, deep - pitch, tuple(face.at(0.0, start)))
             remote.add("slider", key(face, 0.0, start, outline, 0.0004, height + 0.0006), slide)
         else:

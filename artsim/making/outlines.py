@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from artsim.common.elementary import cos, sin
 from artsim.common.elementary import power as raised
@@ -94,3 +95,18 @@ def superellipse(power: float, x: float, y: float, count: int) -> Array:
 def lifted(outline: Array, z: float) -> Array:
     """(N, 3) points of an (N, 2) outline at a height."""
     return np.column_stack([outline, np.full(len(outline), z)])
+
+
+def cross_sections(levels: ArrayLike, fronts: ArrayLike, backs: ArrayLike, halves: ArrayLike, roundness: float,
+                   steps: int = 2) -> list[Array]:  # fmt: skip
+    """Rounded rectangles across the Z axis at heights ``levels``, to loft an upright body from.
+
+    Each reaches from x = front to back and to y = half at either side; ``roundness`` is the radius of its edges over
+    half of its thickness, at most 1.
+    """
+
+    def ring(z: float, front: float, back: float, half: float) -> Array:
+        radius = roundness * 0.5 * min(back - front, 2.0 * half)
+        return lifted(rounded_rectangle((front, -half), (back, half), radius, steps), z)
+
+    return [ring(*row) for row in np.stack(np.broadcast_arrays(levels, fronts, backs, halves), axis=1)]

@@ -7,7 +7,6 @@ from artsim.families import make
 from artsim.families.keys import (
     Face,
     add_key,
-    cross_sections,
     front_face,
     key_cells,
     key_outline,
@@ -15,6 +14,7 @@ from artsim.families.keys import (
     top_face,
 )
 from artsim.making.assembly import Assembly
+from artsim.making.outlines import cross_sections
 from artsim.making.solids import hull, loft
 from artsim.model.collision import Sweep
 from artsim.model.transforms import transform_points
