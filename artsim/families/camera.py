@@ -1,8 +1,7 @@
 """Cameras: compact, single-lens reflex, rangefinder, instant, camcorder, and cameras on a swivel.
 
-What varies: the kind, the proportions of the body, grip, prism and viewfinder, the lens (rings that turn, one to
-three tubes that slide out of each other, a cap), dials and buttons on top and at the back, a flash that pops up, a
-screen that swings out at the back or at the side, a back that opens, a door at the side. Two to eleven parts move.
+What varies: the kind, the body, the lens (rings that turn, one to three tubes that slide, a cap), dials and buttons, a
+flash that pops up, a screen that swings out, a back or a door at the side that opens. Two to eleven parts move.
 """
 
 from itertools import pairwise
@@ -110,10 +109,8 @@ def _body(draws: Draws, shell: Shell, kind: str) -> tuple[Solid, tuple[float, fl
     elif kind == "instant":
         rise = height * draws.number("top_height", (0.1, 0.35))
         wide = half * draws.number("top_width", (0.3, 0.98))
-        body += hull_of(
-            box((0.2 * depth, depth), wide, (height - 0.002, height)),
-            box((0.4 * depth, depth), 0.9 * wide, (height + rise - 0.002, height + rise)),
-        )
+        crown = box((0.4 * depth, depth), 0.9 * wide, (height + rise - 0.002, height + rise))
+        body += hull_of(box((0.2 * depth, depth), wide, (height - 0.002, height)), crown)
         slot = min(0.18 * height, shell.lens_z - shell.lens_radius - 0.002)  # where pictures come out
         body += box((-0.3 * depth, 0.1 * depth), half, (0, slot), fillet=0.004)
         span = (-0.6 * wide, 0.6 * wide, height + rise)
@@ -198,22 +195,22 @@ def _back(draws: Draws, camera: Assembly, shell: Shell) -> None:
         leaf = box((x, x + thick), 0.97 * half, (0.06 * height, 0.92 * height), fillet=0.002, axis=0)
         joint = revolute("body", -UP, (x + thick, -0.97 * half, 0), 0.0, draws.angle("back_angle", (1.2, 2.2)))
         camera.add("back", leaf, joint, label="door")
+
+    def press(name: str, z: float, radius: float, tall: float) -> None:
+        button = rod((x + 0.0012, x + 0.0012 + tall), y, z, radius, sections=14)
+        camera.add(name, button, prismatic("body", FRONT, 0.0, 0.001, (x, y, z)))
+
     if kind != "door":
-        room = half - y1
-        size = min(0.2 * room, 0.08 * height, 0.006)
+        y, size = 0.5 * (y1 + half), min(0.2 * (half - y1), 0.08 * height, 0.006)
         style = draws.pick("back_controls", {"pad": 0.4, "row": 0.35, "none": 0.25})
-        y = 0.5 * (y1 + half)
         if style == "pad" and size > 0.001:
             z = 0.4 * height
             wheel = ring((x + 0.3 * size, y, z), (1, 0, 0), 1.1 * size, 1.9 * size, 0.6 * size, 16)
             camera.add("wheel", wheel, continuous("body", (1, 0, 0), (x, y, z)), label="dial")
-            button = rod((x + 0.0012, x + 0.0012 + 0.6 * size), y, z, 0.8 * size, sections=14)
-            camera.add("button", button, prismatic("body", FRONT, 0.0, 0.001, (x, y, z)))
+            press("button", z, 0.8 * size, 0.6 * size)
         elif style == "row" and size > 0.001:
             for number in range(draws.integer("back_buttons", 1, 3)):
-                z = height * (0.2 + 0.2 * number)
-                button = rod((x + 0.0012, x + 0.0012 + 0.5 * size), y, z, size, sections=14)
-                camera.add(f"button_{number}", button, prismatic("body", FRONT, 0.0, 0.001, (x, y, z)))
+                press(f"button_{number}", height * (0.2 + 0.2 * number), size, 0.5 * size)
     if draws.chance("side_door", 0.2):  # at the right side
         y, t = half + 0.001, 0.0025
         deep = (0.2 * shell.depth, 0.8 * shell.depth)

@@ -1,15 +1,14 @@
 """Displays, their screens towards -X: monitors on stands, television sets on feet, tubes on swivels, panels on easels.
 
-What varies: the kind; size, format and thickness of the panel, its frame, a bent screen, one to three screens on a bar;
-the foot (plate, disc, two legs, ring, arms); which of turn, height, tilt and portrait joints there are, and their
-limits; keys, knobs and rabbit ears.
+What varies: the kind; the panel, one to three of them on a bar; the foot; which of turn, height, tilt and portrait
+joints there are; keys, knobs and rabbit ears.
 """
 
 import numpy as np
 
 from artsim.common.elementary import arcsin, cos, hypot, sin
 from artsim.families.details import dial
-from artsim.families.keys import Face, add_buttons, add_key, front_face, key_outline, pill
+from artsim.families.keys import Face, add_buttons, add_key, front_face, key_outline, pill, side_face
 from artsim.families.screens import Panel, draw_panel, screen
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
 from artsim.making.draws import Draws
@@ -67,11 +66,9 @@ def _foot(draws: Draws, half: float, depth: float, thick: float) -> Solid:
         return ring((0, 0, 0.5 * thick), UP, inner, outer, thick, 28) + bar
     if kind == "arc":
         width = draws.length("foot_leg_width", (0.025, 0.05))
-        bows = [
-            [(front + 0.6 * (back - front) * a * a + d, half * a, z) for d in (0.0, width) for z in (0.0, thick)]
-            for a in np.linspace(-1.0, 1.0, 9)
-        ]
-        return loft(bows) + box((front + 0.5 * width, 0.6 * back), width, (0, thick))
+        bow = [(front + 0.6 * (back - front) * a * a, half * a) for a in np.linspace(-1.0, 1.0, 9)]
+        rings = [[(x + d, y, z) for d in (0.0, width) for z in (0.0, thick)] for x, y in bow]
+        return loft(rings) + box((front + 0.5 * width, 0.6 * back), width, (0, thick))
     radius = draws.number("foot_corner", (0.02, 0.95)) * min(half, 0.5 * depth)
     outline = rounded_rectangle((front, -half), (back, half), radius, 4)
     top = draws.number("foot_taper", (0.55, 0.9) if kind == "tapered" else (0.96, 1.0))
@@ -82,9 +79,9 @@ def _foot(draws: Draws, half: float, depth: float, thick: float) -> Solid:
 class _Chain:
     """Parts in a row, each on the one before it; what no joint parts goes into the same part."""
 
-    def __init__(self, display: Assembly) -> None:
+    def __init__(self, display: Assembly, root: str = "base") -> None:
         self.display = display
-        self.name, self.joint, self.solid = "base", None, Solid()  # type: tuple[str, JointSpec | None, Solid]
+        self.name, self.joint, self.solid = root, None, Solid()  # type: tuple[str, JointSpec | None, Solid]
 
     def part(self, name: str, joint: JointSpec) -> None:
         """Finish the part so far, and begin one that hangs on it."""
@@ -118,11 +115,9 @@ def _on_stand(draws: Draws, display: Assembly) -> None:
     top = middle + (half_sleeve + draws.number("column_height", (0.0, 0.6)) * panel.rise if slides else 0.0)
 
     chain = _Chain(display)
-    wide, deep = (
-        panel.half * draws.number("foot_width", (0.35, 0.85)),
-        panel.half * draws.number("foot_depth", (0.5, 1.0)),
-    )
-    chain.solid = _foot(draws, wide, max(deep, 0.13), thick)
+    wide = panel.half * draws.number("foot_width", (0.35, 0.85))
+    deep = max(panel.half * draws.number("foot_depth", (0.5, 1.0)), 0.13)
+    chain.solid = _foot(draws, wide, deep, thick)
     foot = thick
     if swivels:
         turn = draws.angle("neck_angle", (0.35, 1.57))
@@ -131,23 +126,20 @@ def _on_stand(draws: Draws, display: Assembly) -> None:
         chain.solid = rod(0, 0, (foot, foot + 0.006), draws.number("neck_radius", (1.6, 2.4)) * radius, sections=24)
     chain.solid += _column(draws, radius, foot + (0.004 if swivels else -0.004), top, not slides)
     if slides:
-        travel = (top - middle) * draws.number("slider_travel", (0.5, 0.9)) + draws.length(
-            "slider_spare", (0.0, half_sleeve)
-        )
+        travel = (top - middle) * draws.number("slider_travel", (0.5, 0.9))
+        travel += draws.length("slider_spare", (0.0, half_sleeve))
         chain.part("slider", prismatic(chain.name, (0, 0, 1), 0.0, travel, (0, 0, middle)))
-        outer = radius + GAP + 0.006
-        chain.solid = frame(
-            (-outer, -outer, middle - half_sleeve), (outer, outer, middle + half_sleeve), [0.006] * 4, 0, 1
-        )
+        outer, (low, high) = radius + GAP + 0.006, about(middle, half_sleeve)
+        chain.solid = frame((-outer, -outer, low), (outer, outer, high), [0.006] * 4, 0, 1)
     offsets = (np.arange(count) - 0.5 * (count - 1)) * (2.0 * panel.half + 0.02)
     if count > 1:
         reach = float(offsets[-1]) + 0.03
-        chain.solid += box((front - 0.004, front + 0.005), reach, (middle - 0.014, middle + 0.014), fillet=0.004)
+        chain.solid += box((front - 0.004, front + 0.005), reach, about(middle, 0.014), fillet=0.004)
     ear = 0.6 * radius
     for y in offsets:
-        chain.solid += box((axis, front + 0.004), (y - ear, y + ear), (middle - 0.8 * knuckle, middle + 0.8 * knuckle))
+        chain.solid += box((axis, front + 0.004), about(y, ear), about(middle, 0.8 * knuckle))
         if tilts:
-            chain.solid += rod(axis, (y - ear, y + ear), middle, knuckle, sections=14)
+            chain.solid += rod(axis, about(y, ear), middle, knuckle, sections=14)
     parent = chain.name
     if count > 1:
         chain.finish()
@@ -184,23 +176,22 @@ def _column(draws: Draws, radius: float, low: float, high: float, free: bool) ->
     wide = radius * wide if kind == "wide" else radius
     foot = wide * (draws.number("column_spread", (1.2, 4.0)) if kind == "tapered" else 1.0)
     deep = radius if not free else radius * draws.number("column_depth", (0.5, 1.0))
-    return hull(
-        [(x, y, z) for z, w in ((low, foot), (high, wide)) for x in (-radius, 2.0 * deep - radius) for y in (-w, w)]
-    )
+    ends = ((low, foot), (high, wide))
+    return hull([(x, y, z) for z, w in ends for x in (-radius, 2.0 * deep - radius) for y in (-w, w)])
 
 
 def _head(
     plane: float, axis: float, y: float, z: float, ear: float, knuckle: float, panel: Panel, tilts: bool
 ) -> Solid:
     """What holds a screen: a plate behind it, and ears on either side of the hinge, or an arm where nothing tilts."""
-    size = min(0.045, 0.5 * panel.rise)
-    solid = box((plane, plane + 0.006), (y - 0.8 * size, y + 0.8 * size), (z - size, z + size))
+    size, upright = min(0.045, 0.5 * panel.rise), about(z, 0.8 * knuckle)
+    solid = box((plane, plane + 0.006), about(y, 0.8 * size), about(z, size))
     if not tilts:
-        return solid + box((plane, axis + 0.001), (y - ear, y + ear), (z - 0.8 * knuckle, z + 0.8 * knuckle))
+        return solid + box((plane, axis + 0.001), about(y, ear), upright)
     for s in (-1.0, 1.0):
         first, last = sorted((y + s * (ear + 0.001), y + s * (ear + 0.006)))
         solid += rod(axis, (first, last), z, knuckle, sections=14)
-        solid += box((plane, axis), (first, last), (z - 0.8 * knuckle, z + 0.8 * knuckle))
+        solid += box((plane, axis), (first, last), upright)
     return solid
 
 
@@ -208,26 +199,18 @@ def _finish_screen(draws: Draws, chain: _Chain, panel: Panel, at: Array, number:
     """Add the panel to the chain's last part, finish that, and put keys on the first one."""
     chin = draws.number("chin", (0.0, 0.16)) * panel.rise * draws.pick("has_chin", {False: 0.4, True: 0.6})
     chain.solid += screen(draws, panel, chin).moved(at)
-    name = chain.finish()
+    name, size = chain.finish(), min(0.4 * panel.thick, 0.008)
     if number > 0:
         return
     if chin > 0.012 and not panel.bend:
         face = front_face(float(at[0]) - panel.thick, float(at[1]), float(at[2]) - panel.rise + 0.5 * chin)
         _keys(draws, chain.display, name, face, 0.9 * panel.half, 0.6 * chin)
-    else:  # on the right edge
-        face = Face(at + (-0.5 * panel.thick - panel.bend, -panel.half, 0.0), -FRONT, UP)
-        _edge_keys(draws, chain.display, name, face, panel)
-
-
-def _edge_keys(draws: Draws, display: Assembly, name: str, face: Face, panel: Panel) -> None:
-    """Keys above one another on an edge, on some."""
-    size = min(0.4 * panel.thick, 0.008)
-    if not draws.chance("button", 0.5, upper=True) or size < 0.002:
-        return
-    pitch = 2.6 * size
-    count = min(draws.integer("buttons", 1, 5), int(0.8 * panel.rise / pitch))
-    spots = [(0.0, (k - 3.0) * pitch) for k in range(count)]
-    add_buttons(display, name, face, spots, pill(size, 1.8 * size), 0.003, 0.001)
+    elif draws.chance("button", 0.5, upper=True) and size >= 0.002:  # above one another, on the right edge
+        pitch = 2.6 * size
+        count = min(draws.integer("buttons", 1, 5), int(0.8 * panel.rise / pitch))
+        face = side_face(-1.0, *(at + (-0.5 * panel.thick - panel.bend, -panel.half, 0.0)))
+        spots = [(0.0, (k - 3.0) * pitch) for k in range(count)]
+        add_buttons(chain.display, name, face, spots, pill(size, 1.8 * size), 0.003, 0.001)
 
 
 def _on_feet(draws: Draws, display: Assembly) -> None:
@@ -235,8 +218,7 @@ def _on_feet(draws: Draws, display: Assembly) -> None:
     panel = draw_panel(draws, 1.5)
     foot = draws.length("foot_height", (0.02, 0.1))
     middle = foot + GAP + panel.rise
-    chain = _Chain(display)
-    chain.name = "body"
+    chain = _Chain(display, "body")
     _finish_screen(draws, chain, panel, np.array([0.0, 0.0, middle]), 0)
     x = -0.5 * panel.thick
     spread = panel.half * draws.number("foot_place", (0.45, 0.85))
@@ -247,9 +229,9 @@ def _on_feet(draws: Draws, display: Assembly) -> None:
         y = s * spread
         solid = hull([(x + a * reach, y + b * wide, z) for a in (-1, 1) for b in (-1, 1) for z in (0.0, 0.006)])
         if draws.chance("foot_slopes", 0.5):
-            levels = ((0.8, 0.004), (0.3, foot))
+            ends = ((0.8, 0.004), (0.3, foot))
             solid += hull(
-                [(x + a * r * reach * 0.9, y + b * leg, z) for a in (-1, 1) for b in (-1, 1) for r, z in levels]
+                [(x + a * r * reach * 0.9, y + b * leg, z) for a in (-1, 1) for b in (-1, 1) for r, z in ends]
             )
         else:
             solid += rod(x, y, (0.004, foot), leg, sections=14)
@@ -259,8 +241,7 @@ def _on_feet(draws: Draws, display: Assembly) -> None:
 def _on_easel(draws: Draws, display: Assembly) -> None:
     """A thin panel with a leaf or two legs on its back that fold out."""
     panel = draw_panel(draws, 0.6)
-    chain = _Chain(display)
-    chain.name = "body"
+    chain = _Chain(display, "body")
     _finish_screen(draws, chain, panel, np.array([0.0, 0.0, panel.rise]), 0)
     z = 2.0 * panel.rise * draws.number("prop_height", (0.3, 0.85))
     low, thick = 0.04 * panel.rise, draws.length("prop_thickness", (0.002, 0.008))
@@ -339,8 +320,7 @@ def _rabbit_ears(draws: Draws, display: Assembly, parent: str, foot: Array, half
     for k, s in enumerate((-1.0, 1.0)):
         pivot = foot + (0.0, s * 0.05, 0.012)
         tip = pivot + length * np.array([0.0, s * float(sin(lean)), float(cos(lean))])
-        ear = tube([pivot, tip], [0.003, 0.0018], 8) + cylinder(
-            pivot - (0.007, 0, 0), pivot + (0.007, 0, 0), 0.008, sections=12
-        )
+        ear = tube([pivot, tip], [0.003, 0.0018], 8)
+        ear += cylinder(pivot - (0.007, 0, 0), pivot + (0.007, 0, 0), 0.008, sections=12)
         hinge = revolute(parent, (s, 0, 0), tuple(pivot), -draws.angle("antenna_angle", (0.3, 0.8)), lean * 0.8)
         display.add(f"antenna_{k}", ear, hinge, density=3000.0)

@@ -1,8 +1,7 @@
 """Laptops: a base with keyboard and touchpad, and a lid with a screen on a hinge at the back.
 
-What varies: proportions, thickness (from tablets with a keyboard to thick old ones), round or bevelled shells, a base
-that is shorter than the lid or reaches behind the hinge, one long hinge or two short ones, keyboard with or without
-number block, touchpad and its buttons, the screen's frame, badges, feet, how far the lid opens.
+What varies: proportions and thickness, round or bevelled shells, a base that is shorter than the lid or reaches behind
+the hinge, hinges, keyboard and touchpad, the screen's frame, badges, feet, how far the lid opens.
 """
 
 from itertools import pairwise
@@ -14,7 +13,7 @@ from artsim.families.details import drawn_from
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, UP
-from artsim.making.solids import Solid, box, frame, hull_of, posts, rod
+from artsim.making.solids import Solid, box, frame, hull_of, posts, rod, union
 
 GAP = 0.0008
 
@@ -60,9 +59,8 @@ def build(draws: Draws) -> Assembly:
     laptop = Assembly("base", _propped(draws, shape) if shape.tilt else _base(draws, shape), 1400.0)
     far = draws.chance("opens_far", 0.9)
     opening = np.deg2rad(draws.degrees("lid_angle", (88.0, 180.0) if far else (42.0, 88.0)))
-    hinge = (shape.hinge_x, 0, shape.hinge_z)
-    lid = _lid(draws, shape) + _hinges(draws, shape)
-    laptop.add("lid", lid, revolute("base", (0, 1, 0), hinge, 0.0, opening))
+    hinge = revolute("base", (0, 1, 0), (shape.hinge_x, 0, shape.hinge_z), 0.0, opening)
+    laptop.add("lid", _lid(draws, shape) + _hinges(draws, shape), hinge)
     return laptop
 
 
@@ -79,20 +77,15 @@ def _shell(draws: Draws, low: tuple[float, ...], high: tuple[float, ...], corner
     inner = (z1 - 0.001, z1) if side > 0 else (z0, z0 + 0.001)
     bevel = draws.number("bevel", (0.3, 2.0)) * thick if kind == "bevel" else 0.1 * thick
     recess = bevel if kind == "bevel" else draws.number("wedge", (0.1, 0.5)) * (high[0] - low[0])
-    return hull_of(
-        box((*low[:2], outer[0]), (*high[:2], outer[1]), fillet=corner, axis=2),
-        box(
-            (low[0] + recess, low[1] + bevel, inner[0]), (high[0] - min(bevel, 0.005), high[1] - bevel, inner[1]),
-            fillet=corner, axis=2,
-        ),
-    )  # fmt: skip
+    edge = box((*low[:2], outer[0]), (*high[:2], outer[1]), fillet=corner, axis=2)
+    face_low, face_high = (low[0] + recess, low[1] + bevel), (high[0] - min(bevel, 0.005), high[1] - bevel)
+    return hull_of(edge, box((*face_low, inner[0]), (*face_high, inner[1]), fillet=corner, axis=2))
 
 
 def _base(draws: Draws, shape: _Shape) -> Solid:
     """The lower shell: keys and touchpad lie in a sunken deck, so that the lid can close on the rim."""
     width, height, front, back = shape.width, shape.height, shape.base_front, shape.back
-    sink = min(0.0015, 0.2 * height)
-    deck = height - sink
+    deck = height - min(0.0015, 0.2 * height)
     rim = width * draws.number("rim", (0.01, 0.03))
     solid = _shell(draws.within("base"), (front, -width / 2, 0), (back, width / 2, deck), shape.corner, -1)
     for y in (-width / 2, width / 2 - rim):
@@ -180,10 +173,8 @@ def _lid(draws: Draws, shape: _Shape) -> Solid:
         edges = ("side", "brow", "chin")
         side, brow, chin = (shape.width * draws.number(f"screen_{edge}", (0.01, 0.05)) + inset for edge in edges)
         chin += shape.depth * draws.number("deeper_chin", (0.0, 0.06))
-        solid += frame(
-            (front + inset, -half + inset, low), (back - inset, half - inset, low + sunken + 0.0008),
-            [brow, chin, side, side], 0, 1,
-        )  # fmt: skip
+        corners = (front + inset, inset - half, low), (back - inset, half - inset, low + sunken + 0.0008)
+        solid += frame(*corners, [brow, chin, side, side], 0, 1)
     middle = 0.5 * (front + back)
     badge = draws.pick("badge", {"disc": 0.35, "plate": 0.15, "ribs": 0.15, "none": 0.35})
     if badge == "disc":
@@ -203,14 +194,10 @@ def _lid(draws: Draws, shape: _Shape) -> Solid:
 
 def _hinges(draws: Draws, shape: _Shape) -> Solid:
     """Barrels on the hinge axis, joined to the lid by short arms above the gap."""
-    inner, outer = draws.number("hinge_inner", (0.2, 0.34)), draws.number("hinge_outer", (0.38, 0.46))
+    inner = draws.number("hinge_inner", (0.2, 0.34)) * shape.width
+    outer = draws.number("hinge_outer", (0.38, 0.46)) * shape.width
     spans = [(-outer, -inner), (inner, outer)] if draws.chance("two_hinges", 0.4) else [(-outer, outer)]
     x, z, radius = shape.hinge_x, shape.hinge_z, shape.hinge_radius
     arm = z + 0.0004
-    solid = Solid()
-    for first, last in spans:
-        right, left = first * shape.width, last * shape.width
-        solid += rod(x, (right, left), z, radius, sections=16)
-        upright = (arm + 0.0004, arm + max(min(0.8 * shape.lid, radius), 0.0015))
-        solid += box((shape.back - 0.012, x), (right, left), upright)
-    return solid
+    deep, upright = (shape.back - 0.012, x), (arm + 0.0004, arm + max(min(0.8 * shape.lid, radius), 0.0015))
+    return union(rod(x, across, z, radius, sections=16) + box(deep, across, upright) for across in spans)

@@ -37,8 +37,8 @@ class _Dome:
         ends = draws.number("front_taper", (0.1, 0.75)), draws.number("back_taper", (0.1, 0.75))
         near, far = np.maximum(1.0 - share / 0.35, 0.0), np.maximum((share - 0.6) / 0.4, 0.0)
         widths = 1.0 - ends[0] * np.square(near) - ends[1] * np.square(far)
-        waist = draws.number("waist", (0.0, 0.2)) * draws.pick("waisted", [False, True])
-        waist = waist * np.maximum(1.0 - np.square((share - 0.42) / 0.3), 0.0)
+        narrow = draws.number("waist", (0.0, 0.2)) * draws.pick("waisted", [False, True])
+        waist = narrow * np.maximum(1.0 - np.square((share - 0.42) / 0.3), 0.0)
         slant = draws.number("slant", (-0.25, 0.25)) * draws.pick("slanted", [False, True]) * half
         self.stations = length * (share - 0.5)
         self.front, self.back = float(self.stations[0]), float(self.stations[-1])

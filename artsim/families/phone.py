@@ -1,8 +1,7 @@
 """Telephones: mobile ones that stand upright with their face towards -X, and desk sets.
 
-What varies: the kind (bar, flip, slider, swivel, folding screen, smartphone, cordless in its dock, desk set with a
-handset); proportions, round edges, bent backs; keypads and their keys, function and side keys; antennas, kickstands,
-cameras; on desk sets the slope, a dial in place of keys, a display that tilts, the handset's shape.
+What varies: the kind; proportions, round edges, bent backs; keypads, function and side keys; antennas, kickstands,
+cameras; on desk sets the slope, a dial in place of keys, a display that tilts, the handset.
 """
 
 from collections.abc import Sequence
@@ -34,10 +33,10 @@ def _slab(draws: Draws, half: float, x: tuple[float, float], z: tuple[float, flo
     """Upright plate with round edges; where ``curve`` is 1 its back (+X) bulges, where it is -1 its front does."""
     levels = np.array([0.0, 0.03, 0.2, 0.5, 0.8, 0.97, 1.0])
     corner = draws.number("corner", (0.0, 0.35)) * np.array([1.0, 0.3, 0.0, 0.0, 0.0, 0.3, 1.0])
-    waist = draws.number("waist", (-0.12, 0.12)) * draws.pick("waisted", [False, True])
-    waist = waist * np.array([0.0, 0.05, 0.6, 1.0, 0.6, 0.05, 0.0])
-    bow = draws.number("bow", (0.1, 0.7)) * (x[1] - x[0]) * draws.pick("bowed", [False, True])
-    bow = bow * np.array([1.0, 0.9, 0.4, draws.number("bow_hollow", (0.0, 0.3)), 0.4, 0.9, 1.0])
+    narrow = draws.number("waist", (-0.12, 0.12)) * draws.pick("waisted", [False, True])
+    waist = narrow * np.array([0.0, 0.05, 0.6, 1.0, 0.6, 0.05, 0.0])
+    rise = draws.number("bow", (0.1, 0.7)) * (x[1] - x[0]) * draws.pick("bowed", [False, True])
+    bow = rise * np.array([1.0, 0.9, 0.4, draws.number("bow_hollow", (0.0, 0.3)), 0.4, 0.9, 1.0])
     fronts, backs = np.full(7, x[0]), np.full(7, x[1])
     if curve > 0:
         backs = backs - bow

@@ -1,9 +1,7 @@
 """Printers that face -X: table-top and floor-standing ones, with scanners or without.
 
-What varies: size and kind (inkjet, laser, copier, photo and label printers); the bands of the front from the bottom up:
-paper drawers, a flap or a sliding tray before the output, a door, a panel with keys that is fixed or tilts; the top: a
-scanner's lid with or without a feeder and its tray, an output slope with a stop, a cover; a paper support at the back;
-round edges, feet, casters.
+What varies: the kind; the bands of the front from the bottom up: paper drawers, a flap or a sliding tray, a panel with
+keys that is fixed or tilts; the top: a scanner's lid, a feeder, an output slope with a stop, a paper support.
 """
 
 from dataclasses import dataclass
@@ -14,7 +12,7 @@ from artsim.families.details import drawn_from, drawn_side
 from artsim.families.keys import add_buttons, front_face, key_cells, key_outline, top_face
 from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, about, rounded_rectangle
+from artsim.making.outlines import FRONT, about, lifted, rounded_rectangle
 from artsim.making.solids import Solid, box, hull, posts, prism, rod, tray, union
 from artsim.model.kinematics import Array
 
@@ -56,61 +54,52 @@ class _Case:
                 + self.block(low, high, (-9.0, inner + 1e-3), (-9.0, -half)))  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Band:
-    """A band of the front: what fills it and how high it is."""
-
-    kind: str
-    height: float
-
-
 def build(draws: Draws) -> Assembly:
     """A printer; drawers, lids and flaps are shut and no key is pressed at rest."""
     kind = draws.pick("kind", {"inkjet": 0.4, "laser": 0.24, "copier": 0.18, "small": 0.18})
-    deep, wide = _MEASURES[kind]
-    x, y = 0.5 * draws.length("depth", deep), 0.5 * draws.length("width", wide)
+    depths, widths = _MEASURES[kind]
+    x, y = 0.5 * draws.length("depth", depths), 0.5 * draws.length("width", widths)
     radius = min(x, y) * drawn_from(draws, "corner", {"sharp": (0.01, 0.1), "round": (0.1, 0.35)})
     case = _Case(x, y, rounded_rectangle((-x, -y), (x, y), radius, 3))
     foot = draws.length("foot_height", (0.02, 0.05) if kind == "copier" else (0.002, 0.012))
     bands = _bands(draws, kind, min(x, y))
-    levels = foot + SHELF + np.concatenate([[0.0], np.cumsum([band.height + SHELF for band in bands])])
-    body = case.block(foot, foot + SHELF) + _feet(case, foot, kind == "copier")
+    levels = (foot + SHELF + np.concatenate([[0.0], np.cumsum([tall + SHELF for _, tall in bands])])).tolist()
+    printer = Assembly("body", case.block(foot, foot + SHELF) + _feet(case, foot, kind == "copier"), 350.0)
     half = (y - max(radius * 0.3, 0.008)) * draws.number("drawer_width", (0.75, 0.98))
     cavity = 2.0 * x * draws.number("drawer_depth", (0.55, 0.85))
-    for band, low in zip(bands, levels[:-1], strict=True):
-        high = float(low) + band.height
-        deep = {"solid": 0.0, "panel": 0.0, "tilting": min(0.05, 0.5 * x), "slit": 0.3 * x}.get(band.kind, cavity)
-        if deep:
-            body += case.around(float(low) - 1e-4, high + 1e-4, half, deep)
-        else:
-            body += case.block(float(low) - 1e-4, high + 1e-4)
-        body += case.block(high, high + SHELF)
-    top = float(levels[-1])
     slopes = kind == "laser" and draws.chance("output_slope", 0.65)
     rise = x * draws.number("slope_height", (0.15, 0.4))
+    side = y * draws.number("slope_width", (0.75, 0.9)) if slopes else 0.0
+    for number, ((band, tall), low) in enumerate(zip(bands, levels[:-1], strict=True)):
+        high = low + tall
+        deep = {"solid": 0.0, "panel": 0.0, "tilting": min(0.05, 0.5 * x), "slit": 0.3 * x}.get(band, cavity)
+        if deep:
+            printer.body += case.around(low - 1e-4, high + 1e-4, half, deep)
+        else:
+            printer.body += case.block(low - 1e-4, high + 1e-4)
+        printer.body += case.block(high, high + SHELF)
+        _fill(
+            draws.within("panel" if band == "tilting" else band), printer, -x, band, number, (low, tall), half, cavity
+        )
     if slopes:
-        body += _slope(case, top, rise, y * draws.number("slope_width", (0.75, 0.9)))
-    printer = Assembly("body", body, 350.0)
-    for number, (band, low) in enumerate(zip(bands, levels[:-1], strict=True)):
-        _fill(draws.within(band.kind), printer, case, band, number, float(low), half, cavity)
-    if not slopes:
-        _lid(draws, printer, case, kind, top)
-    elif draws.chance("paper_stop", 0.7, upper=True):
-        _paper_stop(draws, printer, case, top + 0.75 * rise)
+        printer.body += _slope(case, levels[-1], rise, side)
+        if draws.chance("paper_stop", 0.7, upper=True):
+            _paper_stop(draws.within("paper_stop"), printer, case, levels[-1] + 0.75 * rise)
+    else:
+        _lid(draws, printer, case, kind, levels[-1])
     return printer
 
 
-def _bands(draws: Draws, kind: str, size: float) -> list[_Band]:
-    """The front from the bottom up."""
+def _bands(draws: Draws, kind: str, size: float) -> list[tuple[str, float]]:
+    """What fills the bands of the front, from the bottom up, and their heights."""
     tall, count = _DRAWERS[kind]
-    bands = [_Band("drawer", draws.length("drawer_height", tall)) for _ in range(draws.integer("drawers", *count))]
+    bands = [("drawer", draws.length("drawer_height", tall)) for _ in range(draws.integer("drawers", *count))]
     output = size * draws.number("output_height", (0.3, 0.7))
-    bands.append(_Band(draws.pick("output", _OUTPUTS[kind]), output))
+    bands.append((draws.pick("output", _OUTPUTS[kind]), output))
     if kind == "laser" and draws.chance("upper_flap", 0.5):
-        bands.append(_Band("flap", size * draws.number("upper_flap_height", (0.3, 0.8))))
+        bands.append(("flap", size * draws.number("upper_flap_height", (0.3, 0.8))))
     panel = draws.pick("controls", {"panel": 0.45, "tilting": 0.35, "solid": 0.2})
-    bands.append(_Band(panel, size * draws.number("controls_height", (0.2, 0.5))))
-    return bands
+    return [*bands, (panel, size * draws.number("controls_height", (0.2, 0.5)))]
 
 
 def _feet(case: _Case, height: float, casters: bool) -> Solid:
@@ -131,42 +120,43 @@ def _feet(case: _Case, height: float, casters: bool) -> Solid:
 
 
 def _fill(
-    draws: Draws, printer: Assembly, case: _Case, band: _Band, number: int, low: float, half: float, cavity: float
-) -> None:
-    """What moves in a band of the front."""
-    front, high = -case.x, low + band.height
-    wide = half - GAP
-    thick = min(draws.length("thickness", (0.006, 0.014)), 0.3 * band.height)
+    draws: Draws, printer: Assembly, front: float, kind: str, number: int, span: tuple[float, float], half: float,
+    cavity: float,
+) -> None:  # fmt: skip
+    """What moves in a band of the front, whose lower end and height are given."""
+    low, tall = span
+    high, wide = low + tall, half - GAP
+    thick = min(draws.length("thickness", (0.006, 0.014)), 0.3 * tall)
     solid = box((front, front + thick), wide, (low + GAP, high - GAP), fillet=0.03 * wide, axis=0, steps=2)
-    if band.kind == "drawer":
+    if kind == "drawer":
         depth = cavity - 2.0 * GAP
         rise = (high - low) * draws.number("wall_height", (0.5, 0.85))
         solid += tray((front + 0.5 * thick, -0.96 * wide, low + GAP), (front + depth, 0.96 * wide, low + rise), 0.003)
         solid += _pull(draws, front, 0.35 * wide, low + GAP, high - GAP)
         slide = prismatic("body", FRONT, 0.0, depth * draws.number("travel", (0.6, 0.9)), (front, 0, low))
         printer.add(f"drawer_{number}", solid, slide, density=700.0)
-    elif band.kind == "flap":
+    elif kind == "flap":
         if draws.chance("handle", 0.6):
             upright = (high - GAP - 0.012, high - GAP - 0.004)
             solid += box((front - 0.006, front + 0.5 * thick), 0.15 * wide, upright).called("handle", FRONT)
         if draws.chance("guides", 0.4):  # for paper, on its inner side
             deep = (front + thick - 0.001, front + thick + 0.006)
-            tall = (low + 0.2 * band.height, high - 0.1 * band.height)
-            solid += union(box(deep, about(s * 0.7 * wide, 0.003), tall) for s in (-1, 1))
+            upright = (low + 0.2 * tall, high - 0.1 * tall)
+            solid += union(box(deep, about(s * 0.7 * wide, 0.003), upright) for s in (-1, 1))
         hinge = revolute("body", (0, -1, 0), (front, 0, low + GAP), 0.0, draws.angle("angle", (0.9, 1.55)))
         printer.add(f"flap_{number}", solid, hinge, density=900.0)
-    elif band.kind == "tray":
+    elif kind == "tray":
         depth = cavity * draws.number("depth", (0.6, 0.95))
         z = low + GAP
         solid = box((front, front + depth), 0.9 * wide, (z, z + 0.004))
-        solid += box((front, front + 0.005), 0.9 * wide, (z, z + min(0.3 * band.height, 0.014)))
+        solid += box((front, front + 0.005), 0.9 * wide, (z, z + min(0.3 * tall, 0.014)))
         slide = prismatic("body", FRONT, 0.0, 0.85 * depth, (front, 0, low))
         printer.add(f"tray_{number}", solid, slide, density=900.0)
-    elif band.kind == "tilting":
+    elif kind == "tilting":
         hinge = revolute("body", (0, 1, 0), (front, 0, high - GAP), 0.0, draws.angle("angle", (0.4, 1.2)))
         name = printer.add(f"panel_{number}", solid, hinge, density=900.0)
         _keys(draws, printer, name, front, wide, low + GAP, high - GAP)
-    elif band.kind == "panel":
+    elif kind == "panel":
         _keys(draws, printer, "body", front, half, low, high)
 
 
@@ -219,9 +209,9 @@ def _slope(case: _Case, top: float, rise: float, side: float) -> Solid:
 def _paper_stop(draws: Draws, printer: Assembly, case: _Case, level: float) -> None:
     """A flap that lies on the front end of the slope and folds up."""
     z, first = level + GAP, -0.86 * case.x
-    wide, end = case.y * draws.number("paper_stop_width", (0.1, 0.6)), draws.number("paper_stop_end", (-0.6, -0.3))
+    wide, end = case.y * draws.number("width", (0.1, 0.6)), draws.number("end", (-0.6, -0.3))
     flap = box((first, end * case.x), wide, (z, z + 0.004), fillet=0.008, axis=2, steps=2)
-    hinge = revolute("body", (0, -1, 0), (first, 0, z), 0.0, draws.angle("paper_stop_angle", (0.6, 1.6)))
+    hinge = revolute("body", (0, -1, 0), (first, 0, z), 0.0, draws.angle("angle", (0.6, 1.6)))
     printer.add("paper_stop", flap, hinge, density=900.0)
 
 
@@ -242,11 +232,10 @@ def _lid(draws: Draws, printer: Assembly, case: _Case, kind: str, top: float) ->
     shrink = draws.number("lid_taper", (0.9, 1.0))
     middle = outline.mean(axis=0)
     lid = prism(outline, seam, seam + 0.6 * thick)
-    lid += hull(
-        [(*p, seam + 0.5 * thick) for p in outline]
-        + [(*(middle + shrink * (p - middle)), seam + thick) for p in outline]
-    )
     crown = seam + thick
+    lid += hull(
+        np.concatenate([lifted(outline, seam + 0.5 * thick), lifted(middle + shrink * (outline - middle), crown)])
+    )
     feeder = back == case.x and kind != "small" and draws.chance("feeder_tray", 0.6 if kind == "copier" else 0.35)
     if feeder:
         rise = draws.length("feeder_height", (0.03, 0.09))

@@ -1,8 +1,7 @@
 """Remote controls that stand upright: keys on the front towards -X, a battery cover on the back.
 
-What varies: length, width, thickness; outline (straight, tapered, waisted, oval), humps of the back, bent ends, round
-edges; bands of keys (numbers, rows, tall rockers, a slide switch, a navigation pad or a jog dial), their shape, travel
-and number; a battery cover that slides or swings; a front cover that slides or swings; a hinged antenna.
+What varies: the outline and the back; bands of keys (numbers, rows, rockers, a slide switch, a pad or a dial); a
+battery cover and a front cover that slide or swing; a hinged antenna.
 """
 
 import numpy as np
