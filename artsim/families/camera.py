@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.families.details import drawn_side
 from artsim.families.lenses import Lens
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, swivel
 from artsim.making.draws import Draws
@@ -115,7 +114,7 @@ def _body(draws: Draws, shell: Shell, kind: str) -> tuple[Solid, tuple[float, fl
         body += box((-0.3 * depth, 0.1 * depth), half, (0, slot), fillet=0.004)
         span = (-0.6 * wide, 0.6 * wide, height + rise)
     if kind in ("compact", "instant"):
-        y = half * draws.number("window_place", (0.3, 0.7)) * drawn_side(draws, "window_side")
+        y = half * draws.number("window_place", (0.3, 0.7)) * draws.side("window_side")
         window = box((-0.0012, 0.003), about(y, 0.14 * half), (0.8 * height, 0.93 * height), fillet=0.002, axis=0)
         body += window.called("glass", FRONT)
     if kind in ("reflex", "rangefinder") and draws.chance("lugs", 0.4):  # for a strap

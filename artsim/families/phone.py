@@ -9,7 +9,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from artsim.families.desk_phone import desk_set
-from artsim.families.details import drawn_side
 from artsim.families.keys import add_function_keys, add_key, add_keypad, front_face, pill, side_face, top_face
 from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.draws import Draws
@@ -83,7 +82,7 @@ def _aerial(draws: Draws, phone: Assembly, half: float, x: float, length: float,
     if not draws.chance("antenna", 0.45, upper=True):
         return
     radius = min(draws.length("antenna_radius", (0.0015, 0.004)), 0.4 * thick)
-    side = drawn_side(draws, "antenna_side")
+    side = draws.side("antenna_side")
     y, z = side * (half + radius + 0.002), 0.93 * length  # clear of keys on the edge
     stalk = rod(x, y, (z, z - length * draws.number("antenna_length", (0.4, 0.85))), radius, sections=12)
     stalk += rod(x, (y - side * radius, y + 0.5 * side * radius), z, 1.4 * radius, sections=14)
@@ -111,7 +110,7 @@ def _bar(draws: Draws, phone: Assembly) -> None:
     inner = 0.72 * half
     body += box((-0.0006, 0.001), inner, (split + 0.04 * length, 0.9 * length)).called("display", FRONT)
     if draws.chance("stub", 0.35):  # of an antenna
-        y, top = 0.6 * drawn_side(draws, "stub_side") * half, length * draws.number("stub_top", (1.08, 1.35))
+        y, top = 0.6 * draws.side("stub_side") * half, length * draws.number("stub_top", (1.08, 1.35))
         body += rod(0.5 * thick, y, (0.9 * length, top), 0.3 * thick, 0.22 * thick, 12)
     phone.add("body", body)
     height = draws.length("key_height", (0.0011, 0.0026))
@@ -168,7 +167,7 @@ def _slider(draws: Draws, phone: Assembly) -> None:
     lid = _slab(draws.within("lid"), half, (plane - upper, plane), (0.0, length), -1)
     pane = box((plane - upper - 0.0005, plane - 0.5 * upper), 0.75 * half, (0.35 * length, 0.88 * length))
     lid += pane.called("display", FRONT)
-    axis = (0, drawn_side(draws, "slide_side"), 0) if sideways else (0, 0, 1)
+    axis = (0, draws.side("slide_side"), 0) if sideways else (0, 0, 1)
     phone.add("lid", lid, prismatic("body", axis, 0.0, travel, (plane, 0, 0)))
     number = add_keypad(draws, phone, "body", front_face(0.0), 0.78 * half, keys, height)
     front, below = front_face(plane - upper), (0.08 * length, 0.24 * length)
@@ -185,7 +184,7 @@ def _swivel(draws: Draws, phone: Assembly) -> None:
     phone.add("body", body)
     lid = _slab(draws.within("lid"), half, (plane - upper, plane), (0.0, length), -1)
     lid += rod((plane - upper - 0.0006, plane), 0, pivot, 0.5 * half, sections=20)
-    hinge = (drawn_side(draws, "lid_side"), 0, 0), (plane, 0, pivot)
+    hinge = (draws.side("lid_side"), 0, 0), (plane, 0, pivot)
     phone.add("lid", lid, revolute("body", *hinge, 0.0, draws.angle("lid_angle", (1.57, 3.2))))
     add_keypad(draws, phone, "body", front_face(0.0), 0.78 * half, (0.06 * length, pivot - 0.75 * half), height)
     _side_keys(draws, phone, half, 0.5 * lower, (0.0, length), lower)
@@ -194,7 +193,7 @@ def _swivel(draws: Draws, phone: Assembly) -> None:
 def _fold(draws: Draws, phone: Assembly) -> None:
     """Two halves like a book's covers, hinged at one side."""
     length, half, thick = _size(draws)
-    side = drawn_side(draws, "hinge_side")
+    side = draws.side("hinge_side")
     leaf, gap = 0.5 * thick, draws.length("leaf_gap", (0.0008, 0.003))
     radius = 0.6 * leaf
     body = _slab(draws.within("base"), half, (0.5 * gap, leaf), (0.0, length), 1)
@@ -265,7 +264,7 @@ def _cordless(draws: Draws, phone: Assembly) -> None:
     upright = (start + 0.68 * length, start + 0.9 * length)
     body += box((-0.5 * thick - 0.0005, 0.0), inner, upright).called("display", FRONT)
     if draws.chance("stub", 0.4):  # of an antenna
-        y = 0.6 * drawn_side(draws, "stub_side") * half
+        y = 0.6 * draws.side("stub_side") * half
         top = start + length * draws.number("stub_top", (1.08, 1.4))
         body += rod(0, y, (start + 0.9 * length, top), 0.25 * thick, 0.18 * thick, 12)
     lift = prismatic("dock", (0, 0, 1), 0.0, length * draws.number("handset_travel", (0.4, 1.2)), (0, 0, start))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from artsim.families.details import drawn_from, drawn_side
+from artsim.families.details import drawn_from
 from artsim.families.keys import add_buttons, front_face, key_cells, key_outline, top_face
 from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.draws import Draws
@@ -184,7 +184,7 @@ def _keys(draws: Draws, printer: Assembly, parent: str, front: float, half: floa
     columns = draws.integer("key_columns", 1, 5)
     travel = draws.length("key_travel", (0.0008, 0.0015))
     outline = key_outline(draws.pick("key_shape", ["round", "square", "pill"]), (0.68 * pitch, 0.6 * pitch), 10)
-    sides = [-1.0, 1.0] if draws.chance("keys_on_both_sides", 0.3) else [drawn_side(draws, "keys_side")]
+    sides = [-1.0, 1.0] if draws.chance("keys_on_both_sides", 0.3) else [draws.side("keys_side")]
     columns = min(columns, int(0.6 * half / pitch), 12 // (rows * len(sides)))
     number = 0
     for side in sides:
