@@ -313,7 +313,7 @@ def _swivel(draws: Draws) -> Assembly:
     if kind == "clip":
         base = box(0.8 * r, r, (foot - 0.01, foot)) + box((0.4 * r, -0.7 * r, foot - 2 * r), (0.6 * r, 0.7 * r, foot))
     else:
-        tall = r * draws.number("foot_height", (0.2, 0.5) if kind == "disc" else (1.0, 3.0))
+        tall = r * draws.number("height", (0.2, 0.5) if kind == "disc" else (1.0, 3.0))
         base = rod(0, 0, (foot - tall, foot), neck if kind == "column" else 1.1 * r, 0.9 * neck + 0.4 * r)
         base += rod(0, 0, (foot - tall - 0.2 * r, foot - tall + 1e-4), 1.3 * r, 1.2 * r)
     camera = Assembly("body", base, DENSITY)
