@@ -152,11 +152,13 @@ class Draws:
         ]
         return np.array(found)
 
-    def triangular(self, name: str, low: float, mode: float, high: float = 0.0, *, unit: str = "") -> float:
-        """A number whose density rises from ``low`` to ``mode`` and falls to ``high``."""
+    def triangular(
+        self, name: str, low: float, mode: float, high: float = 0.0, *, unit: str = "", of: float = 1.0
+    ) -> float:
+        """A number whose density rises from ``low`` to ``mode`` and falls to ``high``: shares ``of`` a number."""
         if not isinstance(name, str):
             return self._rng.triangular(name, low, mode)
-        return self._number(name, float(self._rng.triangular(low, mode, high)), (low, high), unit)
+        return self._number(name, of * float(self._rng.triangular(low, mode, high)), (of * low, of * high), unit)
 
     def integer(self, name: str, least: int, most: int) -> int:
         """A whole number from ``least`` to ``most``, both included."""
