@@ -24,7 +24,7 @@ _MEASURES = {
     "rangefinder": ((0.11, 0.15), (1.0, 1.35), (0.4, 0.65)),
     "instant": ((0.1, 0.15), (1.3, 2.1), (0.6, 1.3)),
 }
-"""Width of a body, metres; its height and depth over half of that."""
+"""Width of a body, metres; its height and depth as shares of half of that."""
 _ROUND = {"all": None, "upright": 2, "crosswise": 1, "lengthwise": 0}
 """Which edges are round: the axis along which they lie."""
 
@@ -38,7 +38,7 @@ class Shell:
         draws.rng.random(place)  # the width has a draw for each kind, one of which counts
         self.half = half = 0.5 * draws.length("width", wide)
         draws.rng.random(len(_MEASURES) - 1 - place)
-        self.height, self.depth = half * draws.number("height", tall), half * draws.number("depth", deep)
+        self.height, self.depth = draws.length("height", tall, of=half), draws.length("depth", deep, of=half)
         radius = self.height * draws.number("lens_radius", (0.24, 0.4) if kind != "instant" else (0.18, 0.3))
         shift = draws.number("lens_shift", (-0.35, 0.1))
         y = half * shift if draws.pick("lens_place", ["middle", "aside"]) == "aside" else 0.0
@@ -294,7 +294,7 @@ def _swivel(draws: Draws) -> Assembly:
     if shape == "ball":
         head, front, low = ellipsoid((0, 0, 0), r, 20), r, 1.2 * r
     else:
-        long = r * draws.number("depth", (1.4, 2.6) if shape == "bullet" else (0.9, 2.0))
+        long = 0.5 * draws.length("depth", (1.4, 2.6) if shape == "bullet" else (0.9, 2.0), of=2.0 * r)
         front, low = long, 1.3 * long + r
         head = box(long, r, 0.8 * r, fillet=0.2 * r)
     if shape == "bullet":
@@ -313,7 +313,7 @@ def _swivel(draws: Draws) -> Assembly:
     if kind == "clip":
         base = box(0.8 * r, r, (foot - 0.01, foot)) + box((0.4 * r, -0.7 * r, foot - 2 * r), (0.6 * r, 0.7 * r, foot))
     else:
-        tall = r * draws.number("height", (0.2, 0.5) if kind == "disc" else (1.0, 3.0))
+        tall = draws.length("height", (0.2, 0.5) if kind == "disc" else (1.0, 3.0), of=r)
         base = rod(0, 0, (foot - tall, foot), neck if kind == "column" else 1.1 * r, 0.9 * neck + 0.4 * r)
         base += rod(0, 0, (foot - tall - 0.2 * r, foot - tall + 1e-4), 1.3 * r, 1.2 * r)
     camera = Assembly("body", base, DENSITY)

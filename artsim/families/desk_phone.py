@@ -32,12 +32,12 @@ def desk_set(draws: Draws, phone: Assembly) -> None:
     deck = Face(np.array([-0.5 * reach, 0.0, front]), np.array([0.0, -1.0, 0.0]), slope)
     run = reach / slope[0]
     if across:
-        length = max(width * draws.number("handset_length", (0.8, 1.15)), 0.15)
+        length = max(draws.length("handset_length", (0.8, 1.15), of=width), 0.15)
         middle = deck.at(0.0, run - 1.4 * grip)
         along = np.array([0.0, 1.0, 0.0])
         keys_u, keys_v = (-0.42, 0.42), (0.1, 1.0 - 3.2 * grip / run)
     else:
-        length = max(run * draws.number("handset_length", (0.85, 1.15)), 0.15)
+        length = max(draws.length("handset_length", (0.85, 1.15), of=run), 0.15)
         middle = deck.at(-0.5 * width + 1.3 * grip + 0.5 * inset, 0.5 * run)
         along = slope
         keys_u, keys_v = (-0.5 + (3.0 * grip + 0.5 * inset) / width, 0.42), (0.1, 0.9)

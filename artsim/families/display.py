@@ -115,8 +115,8 @@ def _on_stand(draws: Draws, display: Assembly) -> None:
     top = middle + (half_sleeve + draws.number("column_height", (0.0, 0.6)) * panel.rise if slides else 0.0)
 
     chain = _Chain(display)
-    wide = panel.half * draws.number("foot_width", (0.35, 0.85))
-    deep = max(panel.half * draws.number("foot_depth", (0.5, 1.0)), 0.13)
+    wide = 0.5 * draws.length("foot_width", (0.35, 0.85), of=2.0 * panel.half)
+    deep = max(draws.length("foot_depth", (0.5, 1.0), of=panel.half), 0.13)
     chain.solid = _foot(draws, wide, deep, thick)
     foot = thick
     if swivels:
@@ -222,8 +222,8 @@ def _on_feet(draws: Draws, display: Assembly) -> None:
     _finish_screen(draws, chain, panel, np.array([0.0, 0.0, middle]), 0)
     x = -0.5 * panel.thick
     spread = panel.half * draws.number("foot_place", (0.45, 0.85))
-    reach = min(panel.half * draws.number("foot_depth", (0.2, 0.5)), 0.8 * spread)
-    wide, leg = draws.length("foot_width", (0.006, 0.03)), min(0.3 * panel.thick, 0.012)
+    reach = min(0.5 * draws.length("foot_depth", (0.2, 0.5), of=2.0 * panel.half), 0.8 * spread)
+    wide, leg = 0.5 * draws.length("foot_width", (0.012, 0.06)), min(0.3 * panel.thick, 0.012)
     limit = draws.angle("foot_angle", (0.8, 1.57))
     for k, s in enumerate((-1.0, 1.0)):
         y = s * spread
@@ -258,14 +258,15 @@ def _on_easel(draws: Draws, display: Assembly) -> None:
 def _tube(draws: Draws, display: Assembly) -> None:
     """A deep set with a picture tube, on a swivel, or a television set on legs with knobs and rabbit ears."""
     half = 0.5 * draws.length("width", (0.28, 0.76))
-    rise, depth = half * draws.number("height", (0.7, 1.05)), half * draws.number("depth", (1.2, 2.3))
-    cabinet = depth * draws.number("cabinet_depth", (0.2, 0.6))
+    rise = 0.5 * draws.length("height", (0.7, 1.05), of=2.0 * half)
+    depth = draws.length("depth", (1.2, 2.3), of=half)
+    cabinet = draws.length("cabinet_depth", (0.2, 0.6), of=depth)
     foot = draws.length("foot_height", (0.02, 0.07))
     chain = _Chain(display)
     swivels = draws.chance("swivels", 0.65)
     if swivels:
         thick = 0.4 * foot
-        chain.solid = _foot(draws, 0.6 * half, draws.number("foot_depth", (0.8, 1.3)) * half, thick)
+        chain.solid = _foot(draws, 0.6 * half, draws.length("foot_depth", (0.8, 1.3), of=half), thick)
         turn = draws.angle("swivel_angle", (0.5, 1.57))
         chain.part("screen", revolute("base", (0, 0, 1), (0, 0, thick), -turn, turn))
         chain.solid = rod(0, 0, (thick + GAP, foot + 0.004), 0.35 * half, 0.5 * half, 24)

@@ -23,18 +23,16 @@ class _Shape:
 
     def __init__(self, draws: Draws) -> None:
         self.width = width = draws.length("width", (0.18, 0.48))
-        # Depth, height of the base and thickness of the lid are drawn over the width.
         if draws.chance("usual", 0.4):
-            self.depth = width * draws.triangular("depth", 0.54, 0.67, 0.9)
-            self.height = max(width * draws.triangular("height", 0.012, 0.035, 0.11), 0.006)
-            self.lid = max(width * draws.triangular("lid_thickness", 0.01, 0.018, 0.055), 0.004)
+            self.depth = draws.triangular("depth", 0.54, 0.67, 0.9, of=width, unit="m")
+            self.height = max(draws.triangular("height", 0.012, 0.035, 0.11, of=width, unit="m"), 0.006)  # of the base
+            self.lid = max(draws.triangular("lid_thickness", 0.01, 0.018, 0.055, of=width, unit="m"), 0.004)
         else:  # netbooks, tablets with a keyboard, thick old ones, square and very wide ones
             thin = draws.chance("thin", 0.16)  # as tablets are
-            self.depth = width * draws.number("depth", (0.42, 1.12))
-            self.height = width * draws.number("height", (0.009, 0.025) if thin else (0.01, 0.15))
-            self.height = max(self.height, 0.004 if thin else 0.006)
-            self.lid = width * draws.number("lid_thickness", (0.007, 0.018) if thin else (0.008, 0.08))
-            self.lid = max(self.lid, 0.0028 if thin else 0.004)
+            self.depth = draws.length("depth", (0.42, 1.12), of=width)
+            height = draws.length("height", (0.009, 0.025) if thin else (0.01, 0.15), of=width)
+            lid = draws.length("lid_thickness", (0.007, 0.018) if thin else (0.008, 0.08), of=width)
+            self.height, self.lid = max(height, 0.004 if thin else 0.006), max(lid, 0.0028 if thin else 0.004)
         # The lid turns about a barrel between the two shells, in notches behind both.
         self.hinge_radius = draws.number("hinge_radius", (0.2, 0.45)) * min(self.height, self.lid, 0.009)
         self.hinge_x = self.depth / 2 + self.hinge_radius * draws.number("hinge_place", (-0.4, 0.9))
@@ -43,7 +41,7 @@ class _Shape:
         self.tilt = 0.0  # of the base, its front lower, radians
         base = draws.pick("base", {"propped": 0.1, "short": 0.06, "long": 0.14, "usual": 0.7})
         if base == "propped":  # a flat keyboard dock, propped up by a thick bar at the back
-            self.height = max(width * draws.number("dock_height", (0.012, 0.03)), 0.005)
+            self.height = max(draws.length("dock_height", (0.012, 0.03), of=width), 0.005)
             self.tilt = draws.angle("base_tilt", (0.03, 0.2))
         if base in ("propped", "short"):
             self.base_front += draws.number("base_inset", (0.05, 0.22) if self.tilt else (0.01, 0.2)) * self.depth

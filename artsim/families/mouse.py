@@ -27,8 +27,8 @@ class _Dome:
 
     def __init__(self, draws: Draws) -> None:
         length = draws.length("depth", (0.07, 0.14))
-        half = 0.5 * length * draws.triangular("width", 0.4, 0.58, 0.85)  # this and the height: over the depth
-        height = length * draws.triangular("height", 0.13, 0.32, 0.5)
+        half = 0.5 * draws.triangular("width", 0.4, 0.58, 0.85, of=length, unit="m")
+        height = draws.triangular("height", 0.13, 0.32, 0.5, of=length, unit="m")
         share = np.array([0.0, 0.03, 0.1, 0.22, 0.38, 0.55, 0.72, 0.86, 0.95, 1.0])
         top = draws.number("hump_place", (0.35, 0.8))
         front, back = draws.number("front_height", (0.3, 0.85)), draws.number("back_height", (0.15, 0.8))

@@ -59,10 +59,10 @@ def _side_keys(draws: Draws, phone: Assembly, half: float, x: float, z: tuple[fl
 
 
 def _size(draws: Draws) -> tuple[float, float, float]:
-    """Length, half of the width and thickness of a mobile phone; the draws of the last two are over the length."""
+    """Length, half of the width and thickness of a mobile phone."""
     length = draws.log_length("height", 0.12, -0.45, 0.7)
-    half = 0.5 * length * draws.triangular("width", 0.28, 0.45, 0.72)
-    return length, half, length * draws.triangular("depth", 0.06, 0.13, 0.36)
+    half = 0.5 * draws.triangular("width", 0.28, 0.45, 0.72, of=length, unit="m")
+    return length, half, draws.triangular("depth", 0.06, 0.13, 0.36, of=length, unit="m")
 
 
 def _halves(draws: Draws, base: tuple[float, float]) -> tuple[float, float, float, float, float, float]:

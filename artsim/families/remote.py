@@ -24,8 +24,8 @@ class _Body:
 
     def __init__(self, draws: Draws) -> None:
         length = draws.log_length("height", 0.17, -0.75, 0.6)
-        half = 0.5 * length * draws.triangular("width", 0.16, 0.26, 0.62)  # this and the depth: over the height
-        thick = max(length * draws.triangular("depth", 0.035, 0.1, 0.26), 0.006)
+        half = 0.5 * draws.triangular("width", 0.16, 0.26, 0.62, of=length, unit="m")
+        thick = max(draws.triangular("depth", 0.035, 0.1, 0.26, of=length, unit="m"), 0.006)
         low, high = draws.number("keys_bottom", (0.06, 0.3)), draws.number("keys_top", (0.9, 0.96))
         share = np.unique([*np.linspace(0.0, 1.0, 8), low, high])  # the face between low and high is flat
         self.levels = levels = length * share
