@@ -67,9 +67,8 @@ def build(draws: Draws) -> Assembly:
     slope = draws.triangular("slope", 0.0, 0.03, 0.22, unit="rad")
     face = Face(np.array([0.0, 0.0, pads + thick + sin(slope) * -low[1]]), np.array([0.0, -1.0, 0.0]),
                 np.array([cos(slope), 0.0, sin(slope)]))  # fmt: skip
-    body = _plate(draws, face, low, high, pads)
-    rest = float(body.bounds()[0, 0]) - 0.001
-    body += _pads(low, high, pads, feet)
+    plate = _plate(draws, face, low, high, pads)
+    body = plate + _pads(low, high, pads, feet)
     if draws.chance("rim", 0.3):
         body += _rim(face, low, high, min(0.6 * float(margin.min()), 0.003), 0.6 * caps.height)
     body += _trimmings(draws, face, low, high, pads + 0.5 * thick)
@@ -79,7 +78,8 @@ def build(draws: Draws) -> Assembly:
     if feet:
         _feet(draws.within("foot"), keyboard, low, high, pads)
     if kind in ("full", "compact") and draws.chance("wrist_rest", 0.2):
-        _wrist_rest(draws.within("wrist_rest"), keyboard, low, high, rest, pads + thick)
+        end = float(plate.bounds()[0, 0]) - 0.001
+        _wrist_rest(draws.within("wrist_rest"), keyboard, low, high, end, pads + thick)
     return keyboard
 
 

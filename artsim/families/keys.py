@@ -9,7 +9,7 @@ from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, JointSpec, prismatic
 from artsim.making.draws import Draws
 from artsim.making.outlines import Vector, rounded_rectangle
-from artsim.making.solids import Solid, hull, prism, union
+from artsim.making.solids import Solid, deferred, hull, prism, union
 from artsim.model.kinematics import Array
 
 CLEAR = 0.0003
@@ -75,6 +75,7 @@ def pill(u: float, v: float) -> Array:
     return key_outline("pill", (u, v), 8)
 
 
+@deferred
 def key(face: Face, u: float, v: float, outline: Array, low: float, high: float, shrink: float = 0.1) -> Solid:
     """A key between two heights above a face; its top is smaller than its foot by the share ``shrink``."""
     foot = outline + (u, v)

@@ -13,7 +13,7 @@ from artsim.families.details import holed_plate
 from artsim.families.keys import add_key, pill, side_face, top_face
 from artsim.making.assembly import Assembly, JointSpec, continuous, revolute
 from artsim.making.draws import Draws
-from artsim.making.solids import Solid, cylinder, ellipsoid, hull, loft, rod, tube, union
+from artsim.making.solids import Solid, cylinder, deferred, ellipsoid, hull, loft, rod, tube, union
 from artsim.model.kinematics import Array
 from artsim.model.transforms import rotation_about
 
@@ -73,6 +73,7 @@ class _Dome:
         plane[:, 1] = np.clip(plane[:, 1], low * height, share * height - drop)
         return np.column_stack([np.full(len(plane), x), plane])
 
+    @deferred
     def between(self, first: float, last: float, *clamp: object, **more: object) -> Solid:
         """The part of the dome between two x; see :meth:`cut` for the rest."""
         inside = self.stations[(self.stations > first + 1e-5) & (self.stations < last - 1e-5)]

@@ -12,7 +12,7 @@ from artsim.families.keys import Face, add_buttons, add_key, front_face, key, ke
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
 from artsim.making.outlines import cross_sections
-from artsim.making.solids import Solid, box, loft, ring, rod
+from artsim.making.solids import Solid, box, deferred, loft, ring, rod
 from artsim.model.kinematics import Array
 
 GAP = 0.0005
@@ -67,6 +67,7 @@ class _Body:
         """Front, back and half width at a height."""
         return tuple(np.interp(z, self.levels, row) for row in (self.fronts, self.backs, self.halves))  # type: ignore[return-value]
 
+    @deferred
     def between(self, low: float, high: float, inset: float = 0.0) -> Solid:
         """The body between two heights, its back set forward by ``inset``."""
         inside = self.levels[(self.levels > low + 1e-5) & (self.levels < high - 1e-5)]
