@@ -257,7 +257,7 @@ def _folding(draws: Draws, keyboard: Assembly, caps: _Caps) -> None:
     thick = draws.length("height", (0.004, 0.012))
     axis = thick + caps.height + 2.0 * CLEAR
     radius = draws.length("hinge_radius", (0.003, 0.005))
-    corner = draws.length("corner", (0.003, 0.015))
+    corner = draws.length("corner_radius", (0.003, 0.015))
     joint, decks = None, []
     for name, side in _HANDS:
         y = side * (half[0] + radius + GAP)

@@ -267,7 +267,7 @@ def _cordless(draws: Draws, phone: Assembly) -> None:
         y = 0.6 * draws.side("stub_side") * half
         top = start + length * draws.number("stub_top", (1.08, 1.4))
         body += rod(0, y, (start + 0.9 * length, top), 0.25 * thick, 0.18 * thick, 12)
-    lift = prismatic("dock", (0, 0, 1), 0.0, length * draws.number("handset_travel", (0.4, 1.2)), (0, 0, start))
+    lift = prismatic("dock", (0, 0, 1), 0.0, draws.length("handset_travel", (0.4, 1.2), of=length), (0, 0, start))
     phone.add("handset", body, lift, density=900.0)
     height = draws.length("key_height", (0.0011, 0.002))
     add_keypad(draws, phone, "handset", face, inner, (rise + 0.05 * length, 0.66 * length), height)
