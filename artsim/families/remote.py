@@ -17,6 +17,8 @@ from artsim.model.kinematics import Array
 
 GAP = 0.0005
 MOST_KEYS = 34
+_BANDS = {"numbers": (3, 4, 4.0), "rockers": (2, 1, 2.6), "slider": (1, 1, 2.2), "pad": (5, 1, 0.0)}
+"""Columns and rows of keys of a band, and its height in pitches."""
 
 
 class _Body:
@@ -170,8 +172,7 @@ def _plan(draws: Draws, half: float, room: float, pitch: float) -> list[tuple[st
     count, left = 0, room
     for band in wanted:
         columns = draws.integer("key_columns", *((2, 4) if half > 0.009 else (1, 2)))
-        columns, rows = {"numbers": (3, 4), "rockers": (2, 1), "pad": (5, 1), "slider": (1, 1)}.get(band, (columns, 1))
-        pitches = {"numbers": 4.0, "rockers": 2.6, "slider": 2.2}.get(band, 1.0)
+        columns, rows, pitches = _BANDS.get(band, (columns, 1, 1.0))
         deep = min(2.0 * half, 0.06) if band == "pad" else pitches * pitch
         narrow = band != "pad" and 2.0 * half / columns < 0.003
         if deep <= left and count + rows * columns <= MOST_KEYS and not narrow:
