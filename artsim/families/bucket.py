@@ -9,8 +9,9 @@ import numpy as np
 
 from artsim.common.elementary import cos, hypot, power, sin
 from artsim.common.products import norm
-from artsim.families.proportions import with_tails
-from artsim.making.assembly import Assembly, Rng, pick, revolute
+from artsim.making.assembly import Assembly, revolute
+from artsim.making.draws import Draws
+from artsim.making.outlines import SIDE, UP, ends
 from artsim.making.solids import Solid, box, ring, rod, tube, vessel
 from artsim.model.kinematics import Array
 
@@ -18,45 +19,46 @@ SIDES = 20
 """Segments of the vessel's circle."""
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """A bucket whose bail stands up at rest and swings to both sides."""
-    top = with_tails(rng, (0.09, 0.18), (0.06, 0.34), 0.25)
-    height = top * with_tails(rng, (0.85, 3.2), (0.55, 5.4), 0.3)
-    wall = rng.uniform(0.0018, 0.004)
-    profile = _profile(rng, top, height)
-    body = vessel(profile, wall, sections=SIDES) + _rim(rng, top, height, wall, profile)
-    oval = with_tails(rng, (0.7, 0.98), (0.45, 1.9), 0.5) if rng.random() < 0.4 else 1.0  # depth over width
+    top = 0.5 * draws.length("width", (0.18, 0.36), (0.12, 0.68), tails=0.25)
+    height = top * draws.number("height", (0.85, 3.2), (0.55, 5.4), tails=0.3)
+    wall = draws.length("wall", (0.0018, 0.004))
+    profile = _profile(draws, top, height)
+    body = vessel(profile, wall, sections=SIDES) + _rim(draws, top, height, wall, profile)
+    # Its depth over its width.
+    oval = draws.number("depth", (0.7, 0.98), (0.45, 1.9), tails=0.5) if draws.chance("oval", 0.4) else 1.0
     body = body.scaled((oval, 1.0, 1.0))
-    rim_z = height + 0.004
 
-    pin = with_tails(rng, (0.0022, 0.005), (0.0012, 0.005))
+    pin = draws.length("pin_radius", (0.0022, 0.005), (0.0012, 0.005))
     # Pins lie near the rim: a bail bends inwards as it rises, and has to pass the rim outside.
-    pivot = height - top * rng.uniform(0.06, 0.22)
-    ahead = oval * top * rng.uniform(-0.32, 0.32) if rng.random() < 0.3 else 0.0  # of the pins from the middle
-    wire = with_tails(rng, (0.0012, 0.0045), (0.0008, 0.008)) if pin > 0.0017 else 0.0008
+    pivot = height - top * draws.number("pin_height", (0.06, 0.22))
+    # Of the pins from the middle.
+    ahead = oval * top * draws.number("pin_shift", (-0.32, 0.32)) if draws.chance("pins_ahead", 0.3) else 0.0
+    wire = draws.length("wire_radius", (0.0012, 0.0045), (0.0008, 0.008)) if pin > 0.0017 else 0.0008
     outer = top + 0.012  # beyond the rim
     bail_y = outer + 0.0015 + max(wire, 0.0025)
     across = float(np.sqrt(1.0 - np.square(ahead / (oval * top))))
     wall_y = across * float(np.interp(pivot, profile[:, 1], profile[:, 0])) - 0.7 * wall
-    half, boxy = rng.uniform(0.008, 0.016), rng.random() < 0.5
+    half, boxy = draws.length("ear_radius", (0.008, 0.016)), draws.chance("flat_ears", 0.5)
     for side in (-1.0, 1.0):
         ear = _ear(side, (wall_y, outer, bail_y + max(wire, 0.0025) + 0.001), pivot, pin, half, boxy)
         body += ear.moved((ahead, 0, 0))
     # Up to the level, a point of a round bail lies this far from the middle of the pins; the rim keeps within.
-    reach = hypot(max(1.0, oval) * outer + abs(ahead), rim_z - pivot) + 2 * wire + 0.006
-    bail, path, thick = _bail(rng, bail_y, max(reach, bail_y), pivot, pin, wire)
+    reach = hypot(max(1.0, oval) * outer + abs(ahead), height + 0.004 - pivot) + 2 * wire + 0.006
+    bail, path, thick = _bail(draws, bail_y, max(reach, bail_y), pivot, pin, wire)
 
     longest = profile * (max(1.0, oval), 1.0)
-    ends = [_swing(side, path, thick, longest, outer + 0.5 * wire, pivot, ahead) for side in (-1.0, 1.0)]
-    shares = rng.uniform(0.5, 1.0, 2)
-    if rng.random() < 0.5:  # as far to both sides
-        ends, shares = [min(ends)] * 2, np.repeat(shares[0], 2)
-    low, high = (float(share * end) for share, end in zip(shares, ends, strict=True))
-    joint = revolute("body", (0, 1, 0), (ahead, 0, pivot), -low, high)
+    limits = [_swing(side, path, thick, longest, outer + 0.5 * wire, pivot, ahead) for side in (-1.0, 1.0)]
+    shares = draws.numbers("swing", 0.5, 1.0, 2).tolist()
+    if draws.chance("even_swing", 0.5):  # as far to both sides
+        limits, shares = [min(limits)] * 2, [shares[0]] * 2
+    low, high = (share * limit for share, limit in zip(shares, limits, strict=True))
+    joint = revolute("body", SIDE, (ahead, 0, pivot), -low, high)
     bail = bail.moved((ahead, 0, 0))
-    if oval == 1.0 and rng.random() < 0.3:  # pins not quite at the sides
-        turn = rng.uniform(-0.2, 0.2)
-        body, bail = (solid.turned((0, 0, 1), turn) for solid in (body, bail))
+    if oval == 1.0 and draws.chance("pins_turned", 0.3):  # pins not quite at the sides
+        turn = draws.angle("pin_turn", (-0.2, 0.2))
+        body, bail = (solid.turned(UP, turn) for solid in (body, bail))
         origin = (ahead * cos(turn), ahead * sin(turn), pivot)
         joint = revolute("body", (-sin(turn), cos(turn), 0), origin, -low, high)
     bucket = Assembly("body", body, 1500.0)
@@ -81,37 +83,36 @@ def _swing(side: float, path: Array, thick: Array, profile: Array, outer: float,
     return float(angles[max(first - 1, 0), 0])
 
 
-def _profile(rng: Rng, top: float, height: float) -> Array:
+def _profile(draws: Draws, top: float, height: float) -> Array:
     """Outer radius and height, from the bottom up."""
-    bottom = top * rng.uniform(0.6, 0.98)
-    kind = pick(rng, {"taper": 0.5, "steps": 0.2, "belly": 0.15, "foot": 0.15})
+    bottom = top * draws.number("bottom", (0.6, 0.98))
+    kind = draws.pick("shape", {"taper": 0.5, "steps": 0.2, "belly": 0.15, "foot": 0.15})
     if kind == "steps":
-        bend = rng.uniform(0.6, 0.8)
+        bend = draws.number("bend", (0.6, 0.8))
         middle = bottom + (top - bottom) * bend
-        return np.array(
-            [(bottom, 0.0), (0.97 * middle, bend * height), (middle, (bend + 0.03) * height), (top, height)]
-        )
+        low, high = (0.97 * middle, bend * height), (middle, (bend + 0.03) * height)
+        return np.array([(bottom, 0.0), low, high, (top, height)])
     if kind == "belly":
         shares = np.linspace(0.0, 1.0, 4)
-        bulge = sin(np.pi * shares) * top * rng.uniform(0.02, 0.06)
+        bulge = sin(np.pi * shares) * top * draws.number("bulge", (0.02, 0.06))
         return np.column_stack([bottom + (top - bottom) * shares + bulge * (shares < 1), shares * height])
     if kind == "foot":
         return np.array([(bottom, 0.0), (0.97 * bottom, 0.1 * height), (top, height)])
     return np.array([(bottom, 0.0), (top, height)])
 
 
-def _rim(rng: Rng, top: float, height: float, wall: float, profile: Array) -> Solid:
+def _rim(draws: Draws, top: float, height: float, wall: float, profile: Array) -> Solid:
     """Rolled rim, hoops around the side, and a spout."""
-    solid = ring((0, 0, height), (0, 0, 1), top - wall - 0.001, top + rng.uniform(0.002, 0.006), 0.006, SIDES)
-    for share in rng.uniform(0.2, 0.8, pick(rng, {0: 0.5, 1: 0.35, 2: 0.15})):
+    width = draws.length("rim_width", (0.002, 0.006))
+    solid = ring((0, 0, height), UP, top - wall - 0.001, top + width, 0.006, SIDES)
+    slack = np.abs(np.diff(profile[:, 0])).max() * 0.06
+    for share in draws.numbers("hoop_at", 0.2, 0.8, draws.pick("hoops", {0: 0.5, 1: 0.35, 2: 0.15})).tolist():
         radius = float(np.interp(share * height, profile[:, 1], profile[:, 0]))
-        slack = np.abs(np.diff(profile[:, 0])).max() * 0.06
-        solid += ring(
-            (0, 0, share * height), (0, 0, 1), radius - wall, radius + slack + 0.002, rng.uniform(0.006, 0.02), SIDES
-        )
-    if rng.random() < 0.3:
+        width = draws.length("hoop_width", (0.006, 0.02))
+        solid += ring((0, 0, share * height), UP, radius - wall, radius + slack + 0.002, width, SIDES)
+    if draws.chance("foot", 0.3):
         foot = profile[0, 0]
-        solid += ring((0, 0, -0.003), (0, 0, 1), foot - 0.012, foot - 0.001, 0.012, SIDES)
+        solid += ring((0, 0, -0.003), UP, foot - 0.012, foot - 0.001, 0.012, SIDES)
     return solid
 
 
@@ -119,39 +120,41 @@ def _ear(side: float, span: tuple[float, float, float], pivot: float, pin: float
     """Plate or boss from the wall outward, with the pin that the bail hangs on; ``span`` holds where they end in Y."""
     wall, outer, tip = (side * y for y in span)
     if boxy:
-        solid = box(half, (min(wall, outer), max(wall, outer)), (pivot - 1.3 * half, pivot + half))
+        solid = box(half, ends((wall, outer)), (pivot - 1.3 * half, pivot + half))
     else:
         solid = rod(0, (wall, outer), pivot, 1.2 * half, 0.9 * half, 20)
     solid += rod(0, (outer - side * 0.001, tip), pivot, 0.85 * pin, sections=12)
     return solid + rod(0, (tip, tip + side * 0.002), pivot, 1.6 * pin, sections=12)
 
 
-def _bail(rng: Rng, half: float, reach: float, pivot: float, pin: float, wire: float) -> tuple[Solid, Array, Array]:
+def _bail(draws: Draws, half: float, reach: float, pivot: float, pin: float, wire: float) -> tuple[Solid, Array, Array]:
     """Wire or strap from eye to eye over the opening, with a grip in the middle; its middle line and its radius."""
-    curved = rng.random() < 0.85
-    height = reach * (rng.uniform(1.0, 1.3) if rng.random() < 0.6 else rng.uniform(1.2, 1.7))
+    curved = draws.chance("round_bail", 0.85)
+    height = reach * draws.number("bail_height", (1.0, 1.3) if draws.chance("low_bail", 0.6) else (1.2, 1.7))
     if curved:  # from a half circle to a rounded rectangle
         angles = np.linspace(0.0, np.pi, 17)
-        cosine, sine, bend = cos(angles), sin(angles), rng.choice([0.95, rng.uniform(0.5, 0.95)])
+        cosine, sine, bend = cos(angles), sin(angles), draws.number("bail_bend", (0.5, 0.95))
+        if draws.pick("bail", ["circle", "squarish"]) == "circle":
+            bend = 0.95
         path = np.column_stack(
             [np.zeros(17), half * np.sign(cosine) * power(np.abs(cosine), bend), pivot + height * power(sine, bend)]
         )
     else:
-        straight, flat = 0.55 * height, rng.uniform(0.4, 0.8)
+        straight, flat = 0.55 * height, draws.number("bail_top", (0.4, 0.8))
         side = [(0.0, half, pivot), (0.0, half, pivot + straight), (0.0, flat * half, pivot + height)]
         path = np.array(side + [(0.0, -y, z) for _, y, z in side[::-1]])
     lift = (2.2 * pin + 0.6 * wire) / norm(path[1] - path[0])
     path[0] += (path[1] - path[0]) * lift
     path[-1] += (path[-2] - path[-1]) * lift
     solid, radius = tube(path, wire, 8), wire
-    if rng.random() < 0.25:  # a strap, wide along X
-        wide = rng.uniform(1.5, 5.0)
+    if draws.chance("strap", 0.25):  # wide along X
+        wide = draws.number("strap_width", (1.5, 5.0))
         solid, radius = solid.scaled((wide, 1.0, 1.0)), wide * wire
     for side_y in (-half, half):
-        solid += ring((0, side_y, pivot), (0, 1, 0), 1.1 * pin, 2.0 * pin + wire, 0.004, 10)
-    if rng.random() < 0.6:
+        solid += ring((0, side_y, pivot), SIDE, 1.1 * pin, 2.0 * pin + wire, 0.004, 10)
+    if draws.chance("grip", 0.6):
         z = path[:, 2].max()
-        grip, length = rng.uniform(0.007, 0.013), 0.35 * half
+        grip, length = draws.length("grip_radius", (0.007, 0.013)), 0.35 * half
         solid += rod(0, (-length, length), z, grip, sections=16)
         radius = max(radius, grip)
     steps = np.linspace(0.0, len(path) - 1.0, 8 * len(path))
