@@ -9,8 +9,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from artsim.making.assembly import Assembly, JointSpec, Rng, pick, prismatic, revolute
-from artsim.making.outlines import about, lifted, superellipse
+from artsim.making.assembly import Assembly, JointSpec, prismatic, revolute
+from artsim.making.draws import Draws
+from artsim.making.outlines import FRONT, SIDE, UP, Vector, about, lifted, superellipse
 from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, rod, tray, tube, union
 from artsim.model.kinematics import Array
 
@@ -18,40 +19,42 @@ GAP = 0.002
 _AROUND = 24  # sides of the bowl
 Point = tuple[float, float, float]
 Moving = tuple[str, Solid, JointSpec]
-BACK = (0.0, 1.0, 0.0)  # a positive turn about this axis lifts the front edge
+BACK = tuple(SIDE)  # a positive turn about this axis lifts the front edge
 
 
 class _Cover:
     """Seat and lid; metres."""
 
-    def __init__(self, rng: Rng) -> None:
-        self.over = rng.uniform(0.0, 0.012)  # how far they reach beyond the bowl
-        self.thick = rng.uniform(0.014, 0.028)  # of the seat
-        self.lid = rng.uniform(0.012, 0.03)  # thickness of the lid
-        self.axis = rng.uniform(0.015, 0.03)  # distance of the hinges' axis from the seat's end
+    def __init__(self, draws: Draws) -> None:
+        self.over = draws.length("overhang", (0.0, 0.012))  # how far they reach beyond the bowl
+        self.thick = draws.length("seat_thickness", (0.014, 0.028))  # of the seat
+        self.lid = draws.length("lid_thickness", (0.012, 0.03))  # thickness of the lid
+        self.axis = draws.length("hinge_gap", (0.015, 0.03))  # distance of the hinges' axis from the seat's end
         self.rise = 0.5 * self.thick + GAP + self.lid  # of the lid's top over the axis
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """A toilet; one sits down facing -X. Seat and lid lie on the bowl at rest."""
-    length, width = rng.uniform(0.38, 0.56), rng.uniform(0.33, 0.42)
-    height = rng.uniform(0.34, 0.48)
-    power = rng.choice([2.0, rng.uniform(2.0, 2.6), rng.uniform(3.0, 6.0)], p=[0.4, 0.4, 0.2])
-    tank = pick(rng, {"low": 0.7, "high": 0.1, "wall": 0.2})
-    hung = tank == "wall" and rng.random() < 0.7
-    cover = _Cover(rng)
-    lean = rng.uniform(0.0, 0.2)  # beyond upright
+    length, width = draws.length("bowl_length", (0.38, 0.56)), draws.length("width", (0.33, 0.42))
+    height = draws.length("bowl_height", (0.34, 0.48))
+    squareness = {"ellipse": 2.0, "full": draws.number("bowl_fullness", (2.0, 2.6)),
+                  "square": draws.number("bowl_squareness", (3.0, 6.0))}  # fmt: skip
+    power = squareness[draws.pick("bowl", {"ellipse": 0.4, "full": 0.4, "square": 0.2})]
+    tank = draws.pick("cistern", {"low": 0.7, "high": 0.1, "wall": 0.2})
+    hung = tank == "wall" and draws.chance("hung", 0.7)
+    cover = _Cover(draws)
+    lean = draws.angle("lid_lean", (0.0, 0.2))  # beyond upright
     # Behind the axis there is room for the lid as it stands up, and for a lever on the cistern.
     back = 0.5 * length + cover.over + cover.axis + cover.rise + 0.045 + lean * (length + 0.05)
-    body = _bowl(rng, length, width, height, power, back, hung)
+    body = _bowl(draws, length, width, height, power, back, hung)
     moving: list[Moving] = []
     if tank == "low":
-        body += _low_cistern(rng, moving, back, width, height)
+        body += _low_cistern(draws, moving, back, width, height)
     elif tank == "high":
-        body += _high_cistern(rng, moving, back, height)
+        body += _high_cistern(draws, moving, back, height)
     else:
-        body += _wall(rng, moving, back, width, height, hung)
-    fixed, covers = _seat_and_lid(rng, length, width, height, power, cover, np.pi / 2 + lean)
+        body += _wall(draws, moving, back, width, height, hung)
+    fixed, covers = _seat_and_lid(draws, length, width, height, power, cover, np.pi / 2 + lean)
     toilet = Assembly("body", body + fixed, 2300.0)
     for name, solid, joint in covers + moving:
         toilet.add(name, solid, joint, density=1200.0)
@@ -65,26 +68,26 @@ def _oval(length: float, width: float, power: float, z: float, shift: float = 0.
 
 def _rim(outer: tuple[Array, Array], inner: tuple[Array, Array], first: int = 0, last: int = _AROUND) -> Solid:
     """Wedges between outlines, each (bottom, top); only those from ``first`` to ``last`` where the ring is open."""
-    rings = [*outer, *inner]
-    return union(
-        hull([r[k % _AROUND] for r in rings] + [r[(k + 1) % _AROUND] for r in rings]) for k in range(first, last)
-    )
+    pairs = [np.array([r[k % _AROUND] for r in (*outer, *inner)]) for k in range(first, last + 1)]
+    return union(hull(np.concatenate(pair)) for pair in pairwise(pairs))
 
 
-def _bowl(rng: Rng, length: float, width: float, height: float, power: float, back: float, hung: bool) -> Solid:
+def _bowl(draws: Draws, length: float, width: float, height: float, power: float, back: float, hung: bool) -> Solid:
     """Hollow bowl on a foot, with a deck behind it that carries the hinges."""
-    wall = rng.uniform(0.03, 0.05)
-    low = height * rng.uniform(0.35, 0.5)
-    narrow = rng.uniform(0.5, 0.75)
+    wall = draws.length("bowl_wall", (0.03, 0.05))
+    low = height * draws.number("bowl_depth", (0.35, 0.5))
+    narrow = draws.number("bowl_taper", (0.5, 0.75))
     levels = [(low, narrow), (0.5 * (low + height), 0.5 * (1.0 + narrow) + 0.06), (height, 1.0)]
     solid = Solid()
     for (z0, s0), (z1, s1) in pairwise(levels):
-        outer = (_oval(s0 * length, s0 * width, power, z0), _oval(s1 * length, s1 * width, power, z1))
-        inner = tuple(_oval(s * length - 2 * wall, s * width - 2 * wall, power, z) for s, z in ((s0, z0), (s1, z1)))
-        solid += _rim(outer, (inner[0], inner[1]))
+        outer, inner = (
+            (_oval(s0 * length - w, s0 * width - w, power, z0), _oval(s1 * length - w, s1 * width - w, power, z1))
+            for w in (0.0, 2 * wall)
+        )
+        solid += _rim(outer, inner)
     solid += loft([_oval(narrow * length, narrow * width, power, z) for z in (low - 0.02, low + 0.02)])
-    deck = rng.uniform(0.04, 0.12)
-    half = 0.5 * width * rng.uniform(0.75, 1.0)
+    deck = draws.length("deck_thickness", (0.04, 0.12))
+    half = 0.5 * width * draws.number("deck_width", (0.75, 1.0))
     solid += box((0.5 * length - wall, back), half, (height - deck, height))
     solid += hull_of(
         box((0.3 * length, back), 0.8 * half, (height - deck - 0.03, height - deck + 0.01)),
@@ -92,10 +95,10 @@ def _bowl(rng: Rng, length: float, width: float, height: float, power: float, ba
     )
     if hung:
         return solid
-    kind = pick(rng, ["pedestal", "skirt", "box"])
-    foot = rng.uniform(0.5, 0.85)
+    kind = draws.pick("foot", ["pedestal", "skirt", "box"])
+    foot = draws.number("foot_length", (0.5, 0.85))
     if kind == "pedestal":
-        waist = rng.uniform(0.35, 0.5)
+        waist = draws.number("waist", (0.35, 0.5))
         rings = [
             _oval(foot * length, 0.7 * foot * width, 3.0, 0.0, 0.12 * length),
             _oval(0.95 * foot * length, 0.66 * foot * width, 3.0, 0.04, 0.12 * length),
@@ -103,10 +106,9 @@ def _bowl(rng: Rng, length: float, width: float, height: float, power: float, ba
             _oval(narrow * length, narrow * width, power, low),
         ]
         solid += loft(rings)
-        if rng.random() < 0.6:
-            solid += hull_of(
-                box((0.1 * length, back - 0.02), 0.08, (0.01, 0.03)), box((0.2 * length, back), 0.09, (low, low + 0.02))
-            )
+        if draws.chance("trap", 0.6):
+            low_end = box((0.1 * length, back - 0.02), 0.08, (0.01, 0.03))
+            solid += hull_of(low_end, box((0.2 * length, back), 0.09, (low, low + 0.02)))
     elif kind == "skirt":
         shift = 0.5 * (back - 0.5 * foot * length) * 0.5
         below = _oval(foot * length + 0.1, foot * width, 4.0, 0.0, shift)
@@ -117,14 +119,14 @@ def _bowl(rng: Rng, length: float, width: float, height: float, power: float, ba
     return solid
 
 
-def _low_cistern(rng: Rng, moving: list[Moving], back: float, width: float, height: float) -> Solid:
+def _low_cistern(draws: Draws, moving: list[Moving], back: float, width: float, height: float) -> Solid:
     """On the deck, right behind the bowl."""
-    deep, tall = rng.uniform(0.14, 0.22), rng.uniform(0.28, 0.42)
-    half = 0.5 * width * rng.uniform(0.85, 1.35)
+    deep, tall = draws.length("cistern_depth", (0.14, 0.22)), draws.length("cistern_height", (0.28, 0.42))
+    half = 0.5 * width * draws.number("cistern_to_bowl", (0.85, 1.35))
     start = back - 0.001
-    foot = height - rng.uniform(0.0, 0.04)
+    foot = height - draws.length("cistern_drop", (0.0, 0.04))
     wall = 0.02
-    taper = rng.uniform(0.85, 1.0)
+    taper = draws.number("cistern_taper", (0.85, 1.0))
     solid = hull_of(
         box((start, start + taper * deep), taper * half, (foot, foot + 0.05)),
         box((start, start + deep), half, (foot + 0.04, foot + 0.1)),
@@ -136,108 +138,105 @@ def _low_cistern(rng: Rng, moving: list[Moving], back: float, width: float, heig
         box((start, start + 0.7 * deep), 0.6 * taper * half, (foot - 0.06, foot + 0.01)),
         box((start - 0.05, start + 0.02), 0.3 * half, (0.5 * height, 0.5 * height + 0.03)),
     )
-    flush = pick(rng, {"lever": 0.35, "side lever": 0.15, "button": 0.25, "two buttons": 0.25})
-    over, thick = rng.uniform(0.004, 0.02), rng.uniform(0.02, 0.045)
+    flush = draws.pick("flush", {"lever": 0.35, "side lever": 0.15, "button": 0.25, "two buttons": 0.25})
+    over = draws.length("cistern_lid_overhang", (0.004, 0.02))
+    thick = draws.length("cistern_lid_thickness", (0.02, 0.045))
     low, high = (start - over, -half - over, top + GAP), (start + deep + over, half + over, top + GAP + thick)
-    middle = (start + 0.5 * deep, 0.0)
-    buttons = flush.endswith(("button", "buttons"))
-    lifts = rng.random() < 0.5
+    middle = start + 0.5 * deep
+    buttons = flush in ("button", "two buttons")
+    lifts = draws.chance("cistern_lid", 0.5)
     if buttons:
-        lid, parts = _button_lid(rng, low, high, middle, 2 if flush == "two buttons" else 1)
+        lid, parts = _button_lid(draws, low, high, middle, 2 if flush == "two buttons" else 1)
     else:
-        lid, parts = box(low, high, fillet=rng.uniform(0.15, 0.45) * thick), []
+        lid, parts = box(low, high, fillet=draws.number("cistern_lid_edge", (0.15, 0.45)) * thick), []
     if lifts:
-        joint = prismatic("body", (0, 0, 1), 0.0, rng.uniform(0.1, 0.3), (middle[0], 0.0, low[2]))
-        moving.append(("cistern_lid", lid, joint))
+        travel = draws.length("cistern_lid_travel", (0.1, 0.3))
+        moving.append(("cistern_lid", lid, prismatic("body", UP, 0.0, travel, (middle, 0.0, low[2]))))
     else:
         solid += lid + frame((start, -half, top - 0.01), (start + deep, half, low[2] + 0.002), [wall] * 4, 0, 1)
-    parent = "cistern_lid" if lifts else "body"
     for number, button in enumerate(parts):
-        moving.append(
-            (f"button_{number}", button, prismatic(parent, (0, 0, -1), 0.0, 0.006, tuple(button.bounds().mean(axis=0))))
-        )
+        joint = prismatic("cistern_lid" if lifts else "body", (0, 0, -1), 0.0, 0.006, button.bounds().mean(axis=0))
+        moving.append((f"button_{number}", button, joint))
     if not buttons:
-        hand = rng.choice([-1.0, 1.0])
-        level = top - rng.uniform(0.03, 0.08)
+        hand = draws.side("lever_side")
+        level = top - draws.length("lever_drop", (0.03, 0.08))
         if flush == "lever":
-            foot_at, out = (start, hand * (half - rng.uniform(0.05, 0.08)), level), np.array([-1.0, 0.0, 0.0])
-            along = np.array([0.0, -hand, 0.0])
+            inset = draws.length("lever_inset", (0.05, 0.08))
+            moving.append(_lever(draws, (start, hand * (half - inset), level), FRONT, (0.0, -hand, 0.0)))
         else:
-            foot_at, out = (start + 0.04, hand * half, level), np.array([0.0, hand, 0.0])
-            along = np.array([-1.0, 0.0, 0.0])
-        moving.append(_lever(rng, np.array(foot_at), out, along))
+            moving.append(_lever(draws, (start + 0.04, hand * half, level), (0.0, hand, 0.0), FRONT))
     return solid
 
 
-def _lever(rng: Rng, foot: Array, out: Array, along: Array) -> Moving:
+def _lever(draws: Draws, foot: Vector, out: Vector, along: Vector) -> Moving:
     """A handle on a pivot in a wall; pressed down it turns."""
-    long, thick = rng.uniform(0.05, 0.1), rng.uniform(0.004, 0.008)
-    reach = 0.02
-    solid = cylinder(foot + GAP * out, foot + (reach + thick) * out, rng.uniform(0.009, 0.014), sections=16)
-    tip = foot + reach * out + long * along
-    drop = np.array([0.0, 0.0, -rng.uniform(0.0, 0.015)])
-    solid += tube([foot + reach * out, tip + drop], [thick, rng.uniform(0.8, 1.5) * thick], 12)
+    long, thick = draws.length("lever_length", (0.05, 0.1)), draws.length("lever_thickness", (0.004, 0.008))
+    foot, out, along, reach = np.asarray(foot), np.asarray(out), np.asarray(along), 0.02
+    hub = foot + reach * out
+    radius = draws.length("lever_pivot", (0.009, 0.014))
+    solid = cylinder(foot + GAP * out, foot + (reach + thick) * out, radius, sections=16)
+    tip = hub + long * along
+    drop = np.array([0.0, 0.0, -draws.length("lever_droop", (0.0, 0.015))])
+    solid += tube([hub, tip + drop], [thick, draws.number("lever_taper", (0.8, 1.5)) * thick], 12)
     down = np.cross(along, (0.0, 0.0, -1.0))
-    return "lever", solid, revolute("body", down, foot, 0.0, rng.uniform(0.4, 0.8))
+    return "lever", solid, revolute("body", down, foot, 0.0, draws.angle("lever_angle", (0.4, 0.8)))
 
 
-def _button_lid(
-    rng: Rng, low: Point, high: Point, middle: tuple[float, float], count: int
-) -> tuple[Solid, list[Solid]]:
+def _button_lid(draws: Draws, low: Point, high: Point, x: float, count: int) -> tuple[Solid, list[Solid]]:
     """Lid with a square well and the buttons in it."""
-    half = rng.uniform(0.02, 0.035)
-    x, y = middle
-    well = frame(low, high, [x - half - low[0], high[0] - x - half, y - half - low[1], high[1] - y - half], 0, 1)
+    half = 0.5 * draws.length("well_width", (0.04, 0.07))
+    well = frame(low, high, [x - half - low[0], high[0] - x - half, -half - low[1], high[1] - half], 0, 1)
     floor = low[2] + 0.25 * (high[2] - low[2])
-    well += box((x - half - 0.001, x + half + 0.001), (y - half - 0.001, y + half + 0.001), (low[2], floor))
+    well += box((x - half - 0.001, x + half + 0.001), half + 0.001, (low[2], floor))
     buttons = []
-    share = rng.uniform(0.4, 0.65) if count == 2 else 1.0
-    edges = [(-half, half)] if count == 1 else [(-half, -half + 2 * half * share), (-half + 2 * half * share, half)]
+    split = -half + 2 * half * draws.number("button_split", (0.4, 0.65)) if count == 2 else half
     low_z = max(floor + 0.007, high[2] - 0.01)
-    round_off = 0.99 if count == 1 and rng.random() < 0.5 else 0.2
-    for y0, y1 in edges:
+    round_off = 0.99 if count == 1 and draws.chance("round_button", 0.5) else 0.2
+    for y0, y1 in pairwise([-half, half] if count == 1 else [-half, split, half]):
         corner = round_off * 0.5 * min(y1 - y0, 2 * half)
-        deep, across = (x - half + GAP / 2, x + half - GAP / 2), (y + y0 + GAP / 2, y + y1 - GAP / 2)
-        upright = (low_z, high[2] + rng.uniform(0.0065, 0.01))
+        deep, across = (x - half + GAP / 2, x + half - GAP / 2), (y0 + GAP / 2, y1 - GAP / 2)
+        upright = (low_z, high[2] + draws.length("button_height", (0.0065, 0.01)))
         buttons.append(box(deep, across, upright, fillet=corner, axis=2, steps=5))
     return well, buttons
 
 
-def _high_cistern(rng: Rng, moving: list[Moving], back: float, height: float) -> Solid:
+def _high_cistern(draws: Draws, moving: list[Moving], back: float, height: float) -> Solid:
     """Up on a pipe, with a chain to pull."""
-    up = rng.uniform(0.6, 1.3)
-    half, deep, tall = rng.uniform(0.17, 0.26), rng.uniform(0.15, 0.2), rng.uniform(0.2, 0.32)
+    up = draws.length("pipe_length", (0.6, 1.3))
+    half = 0.5 * draws.length("cistern_width", (0.34, 0.52))
+    deep, tall = draws.length("cistern_depth", (0.15, 0.2)), draws.length("cistern_height", (0.2, 0.32))
     x = back + 0.05
-    pipe = tube([(back - 0.03, 0, height - 0.06), (x, 0, height - 0.04), (x, 0, height + up + 0.01)], 0.02, 14)
+    solid = tube([(back - 0.03, 0, height - 0.06), (x, 0, height - 0.04), (x, 0, height + up + 0.01)], 0.02, 14)
     low = height + up
     start = x - 0.5 * deep
-    solid = pipe + box((start, start + deep), half, (low, low + tall), fillet=0.02)
+    solid += box((start, start + deep), half, (low, low + tall), fillet=0.02)
     upright = (low + tall - 0.01, low + tall + 0.02)
     solid += box((start - 0.012, start + deep + 0.012), half + 0.012, upright, fillet=0.008)
-    side = rng.choice([-1.0, 1.0])
+    side = draws.side("chain_side")
     y = side * (half + 0.03)
     upright = (low + 0.6 * tall, low + 0.6 * tall + 0.015)
     solid += box(about(x, 0.012), (side * (half - 0.01), y + side * 0.012), upright)
-    long = rng.uniform(0.3, 0.55) * up + 0.2
+    long = draws.number("chain_length", (0.3, 0.55)) * up + 0.2
     top = low + 0.6 * tall - GAP
     chain = tube([(x, y, top), (x, y, top - long)], 0.0035, 8)
     chain += rod(x, y, (top - long - 0.06, top - long + 0.005), 0.013, 0.008, 14)
-    moving.append(("chain", chain, prismatic("body", (0, 0, -1), 0.0, rng.uniform(0.04, 0.1), (x, y, top))))
+    pull = prismatic("body", (0, 0, -1), 0.0, draws.length("chain_travel", (0.04, 0.1)), (x, y, top))
+    moving.append(("chain", chain, pull))
     return solid
 
 
-def _wall(rng: Rng, moving: list[Moving], back: float, width: float, height: float, hung: bool) -> Solid:
-    """A panel behind the bowl with a plate for one or two buttons, or only a deck with a lever."""
-    half, top = 0.5 * width + rng.uniform(0.03, 0.2), height + rng.uniform(0.45, 0.75)
-    solid = box(
-        (back - 0.001, -half, 0.0 if hung or rng.random() < 0.7 else 0.1), (back + rng.uniform(0.06, 0.16), half, top)
-    )
-    z = top - rng.uniform(0.08, 0.14)
-    wide, high = rng.uniform(0.09, 0.13), rng.uniform(0.06, 0.09)
+def _wall(draws: Draws, moving: list[Moving], back: float, width: float, height: float, hung: bool) -> Solid:
+    """A panel behind the bowl with a plate for one or two buttons."""
+    half = 0.5 * width + draws.length("panel_margin", (0.03, 0.2))
+    top = height + draws.length("panel_height", (0.45, 0.75))
+    low = 0.0 if hung or draws.chance("panel_to_floor", 0.7) else 0.1
+    solid = box((back - 0.001, back + draws.length("panel_thickness", (0.06, 0.16))), half, (low, top))
+    z = top - draws.length("plate_drop", (0.08, 0.14))
+    wide, high = 0.5 * draws.length("plate_width", (0.18, 0.26)), 0.5 * draws.length("plate_height", (0.12, 0.18))
     solid += frame((back - 0.012, -wide, z - high), (back, wide, z + high), [0.012] * 4, 1, 2)
-    count = int(rng.integers(1, 3))
+    count = draws.integer("buttons", 1, 2)
     inner = wide - 0.012 - GAP
-    split = 0.0 if count == 1 else inner * rng.uniform(-0.3, 0.3)
+    split = 0.0 if count == 1 else inner * draws.number("button_split", (-0.3, 0.3))
     edges = [(-inner, inner)] if count == 1 else [(-inner, split - GAP / 2), (split + GAP / 2, inner)]
     for number, (y0, y1) in enumerate(edges):
         upright = (z - high + 0.012 + GAP, z + high - 0.012 - GAP)
@@ -248,7 +247,7 @@ def _wall(rng: Rng, moving: list[Moving], back: float, width: float, height: flo
 
 
 def _seat_and_lid(
-    rng: Rng, length: float, width: float, height: float, power: float, cover: _Cover, limit: float
+    draws: Draws, length: float, width: float, height: float, power: float, cover: _Cover, limit: float
 ) -> tuple[Solid, list[Moving]]:
     """What of seat and lid belongs to the body, and what turns about one axis behind the bowl.
 
@@ -260,32 +259,28 @@ def _seat_and_lid(
     long, wide = length + 2 * cover.over, width + 2 * cover.over
     edge = 0.5 * long
     axis_x = edge + cover.axis
-    half = rng.uniform(0.02, 0.04)
-    apart = 0.5 * width * rng.uniform(0.3, 0.55)
-    seat = _ring(rng, long, wide, power, low, top)
-    round_off = 0.45 * cover.thick
+    half = draws.length("hinge_width", (0.02, 0.04))
+    apart = 0.5 * width * draws.number("hinge_spread", (0.3, 0.55))
+    seat = _ring(draws, long, wide, power, low, top)
     for y in (-apart, apart):
         near, far = y - half / 2 + 0.001, y + half / 2 - 0.001
         seat += box((edge - 0.06, axis_x), (near, far), (low + 0.15 * cover.thick, low + 0.85 * cover.thick))
-        seat += rod(axis_x, (near, far), at, round_off, sections=14)
-    lid = _lid(rng, long, wide, power, top + GAP, cover.lid)
+        seat += rod(axis_x, (near, far), at, 0.45 * cover.thick, sections=14)
+    lid = _lid(draws, long, wide, power, top + GAP, cover.lid)
+    upright = (top + GAP, top + GAP + 0.5 * cover.lid)
     for y in (-apart - half, apart + half):  # arms from the plate down to the axis, beside the seat's
         near, far = y - half / 2 + 0.001, y + half / 2 - 0.001
-        arm = box((edge - 0.07, axis_x), (near, far), (top + GAP, top + GAP + 0.5 * cover.lid))
-        lid += arm + hull_of(
-            rod(axis_x, (near, far), at, 0.3 * cover.thick, sections=14),
-            box((axis_x - 0.01, axis_x), (near, far), (top + GAP, top + GAP + 0.5 * cover.lid)),
-        )
+        lid += box((edge - 0.07, axis_x), (near, far), upright)
+        barrel = rod(axis_x, (near, far), at, 0.3 * cover.thick, sections=14)
+        lid += hull_of(barrel, box((axis_x - 0.01, axis_x), (near, far), upright))
     hinge = (axis_x, 0.0, at)
-    kind = pick(rng, {"both": 0.45, "in step": 0.2, "lid": 0.25, "seat": 0.1})
+    kind = draws.pick("covers", {"both": 0.45, "in step": 0.2, "lid": 0.25, "seat": 0.1})
     if kind == "lid":
-        stops = union(
-            rod(0.3 * length, y, (height - 0.002, low + 0.002), 0.01, sections=10)
-            for y in (-0.36 * width, 0.36 * width)
-        )
+        upright = (height - 0.002, low + 0.002)
+        stops = union(rod(0.3 * length, y, upright, 0.01, sections=10) for y in (-0.36 * width, 0.36 * width))
         return seat + stops, [("lid", lid, revolute("body", BACK, hinge, 0.0, limit))]
-    share = rng.uniform(0.3, 0.7)
-    first = share * limit if kind == "both" else limit * rng.uniform(0.96, 1.0)
+    share = draws.number("seat_share", (0.3, 0.7))
+    first = share * limit if kind == "both" else limit * draws.number("seat_turn", (0.96, 1.0))
     covers: list[Moving] = [("seat", seat, revolute("body", BACK, hinge, 0.0, first))]
     if kind == "both":
         covers.append(("lid", lid, revolute("seat", BACK, hinge, 0.0, (1.0 - share) * limit)))
@@ -294,20 +289,21 @@ def _seat_and_lid(
     return Solid(), covers
 
 
-def _ring(rng: Rng, long: float, wide: float, power: float, low: float, top: float) -> Solid:
+def _ring(draws: Draws, long: float, wide: float, power: float, low: float, top: float) -> Solid:
     """Seat: a ring, closed or open at the front."""
-    broad = rng.uniform(0.16, 0.24)
-    inner_long, inner_wide = long - broad * rng.uniform(0.8, 1.0), wide - broad * rng.uniform(0.7, 0.95)
+    broad = draws.length("seat_border", (0.16, 0.24))
+    inner_long = long - broad * draws.number("seat_length", (0.8, 1.0))
+    inner_wide = wide - broad * draws.number("seat_width", (0.7, 0.95))
     outer = (_oval(long, wide, power, low), _oval(0.985 * long, 0.985 * wide, power, top))
     inner = (_oval(inner_long, inner_wide, 2.0, low, 0.01), _oval(1.03 * inner_long, 1.03 * inner_wide, 2.0, top, 0.01))
     first = _AROUND // 2 + 2
-    return _rim(outer, inner, first, first + _AROUND - 4) if rng.random() < 0.2 else _rim(outer, inner)
+    return _rim(outer, inner, first, first + _AROUND - 4) if draws.chance("open_seat", 0.2) else _rim(outer, inner)
 
 
-def _lid(rng: Rng, long: float, wide: float, power: float, low: float, thick: float) -> Solid:
+def _lid(draws: Draws, long: float, wide: float, power: float, low: float, thick: float) -> Solid:
     """A plate whose upper edge is bevelled."""
-    scale = rng.uniform(0.96, 1.02)
+    scale = draws.number("lid_size", (0.96, 1.02))
     long, wide = scale * long, scale * wide
-    bevel = rng.uniform(0.02, 0.25)
+    bevel = draws.number("lid_bevel", (0.02, 0.25))
     levels = ((1.0, low), (1.0, low + 0.6 * thick), (1.0 - bevel, low + thick))
     return loft([_oval(share * long, share * wide, power, z) for share, z in levels])
