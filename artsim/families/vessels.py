@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from artsim.common.elementary import cos, power, sin
-from artsim.making.assembly import Rng, pick
+from artsim.making.draws import Draws
 from artsim.making.outlines import UP, about, lifted, turns
-from artsim.making.solids import Solid, box, ellipsoid, hull_of, loft, ring, rod, tube, union
+from artsim.making.solids import Solid, box, deferred, ellipsoid, hull_of, loft, ring, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0008
@@ -43,6 +43,7 @@ def cross_section(kind: str, sharpness: float = 0.5) -> Array:
     return circle
 
 
+@deferred
 def moulded(levels: Sequence[Level], outline: Array, shift: float = 0.0) -> Solid:
     """Body of an outline that :func:`cross_section` makes, its size changing from level to level, from the bottom up.
 
@@ -62,6 +63,7 @@ def neck(radius: float, bore: float, low: float, high: float) -> Solid:
     return ring((0, 0, 0.5 * (low + high)), UP, bore, radius, high - low, 18)
 
 
+@deferred
 def cap(
     radius: float, wall: float, low: float, high: float, bore: float = 0.0, top: float | None = None, sections: int = 24
 ) -> Solid:
@@ -91,15 +93,13 @@ def cap(
     return loft(slices) + rod(0, 0, (under, high), shoulder, upper, sections)
 
 
+@deferred
 def ribs(radius: float, low: float, high: float, count: int, size: float) -> Solid:
     """Upright ribs around a cap."""
-    solid = Solid()
-    for a in turns(count):
-        x, y = radius * cos(a), radius * sin(a)
-        solid += rod(x, y, (low, high), size, sections=6)
-    return solid
+    return union(rod(radius * cos(a), radius * sin(a), (low, high), size, sections=6) for a in turns(count))
 
 
+@deferred
 def dome(radius: float, low: float, rise: float) -> Solid:
     """Round cap of a sphere or flatter, on a level circle."""
     levels = ((0.0, 1.0), (0.4, 0.9), (0.75, 0.64), (0.95, 0.3), (1.0, 0.08))
@@ -107,16 +107,17 @@ def dome(radius: float, low: float, rise: float) -> Solid:
     return hull_of(*(rod(0, 0, (z, z + 1e-5), max(r, 1e-4), sections=20) for z, r in heights))
 
 
-def pump_head(rng: Rng, low: float, stem: float, size: float, reach: float, down: float) -> Solid:
+def pump_head(draws: Draws, low: float, stem: float, size: float, reach: float, down: float) -> Solid:
     """Head of a pump with a nozzle towards -X, ``low`` above the ground, on a stem that goes ``down`` below it.
 
     ``stem`` and ``size`` are the radii of stem and head; the nozzle reaches ``reach`` from the axis.
     """
-    tall = size * rng.uniform(0.45, 1.3)
+    draws = draws.within("head")
+    tall = size * draws.number("height", (0.45, 1.3))
     solid = rod(0, 0, (low - down, low + 0.5 * tall), stem, sections=14)
-    kind = pick(rng, ["saddle", "disc", "hook", "block", "drop"])
-    droop = rng.uniform(0.0, 0.25)
-    r = min(size * rng.uniform(0.3, 0.48), 0.48 * tall)
+    kind = draws.pick("style", ["saddle", "disc", "hook", "block", "drop"])
+    droop = draws.number("droop", (0.0, 0.25))
+    r = min(size * draws.number("nozzle_radius", (0.3, 0.48)), 0.48 * tall)
     middle = low + 0.5 * tall
     if kind == "saddle":  # a wide thumb rest that narrows to the nozzle
         back = box((-0.6 * size, size), size, (low, low + tall), fillet=0.35 * tall)
@@ -126,18 +127,19 @@ def pump_head(rng: Rng, low: float, stem: float, size: float, reach: float, down
         wide = max(1.2 * r, 0.55 * size)
         return solid + box((-reach, 0.9 * size), wide, (low, low + tall), fillet=0.4 * min(tall, wide))
     if kind == "hook":
-        bend = -reach * rng.uniform(0.75, 0.9)
+        bend = -reach * draws.number("bend", (0.75, 0.9))
         path = [(0, 0, middle), (bend, 0, middle + 0.1 * reach), (-reach, 0, middle - max(droop, 0.1) * reach)]
         return solid + tube(path, [1.2 * r, r, 0.8 * r], 10) + rod(0, 0, (low, low + tall), size)
     if kind == "drop":
         back = ellipsoid((0, 0, middle), (size, size, 0.5 * tall), 14)
         return solid + hull_of(back, ellipsoid((-reach, 0, middle - 0.5 * droop * reach), 0.7 * r, 10))
     top = low + tall
-    solid += rod(0, 0, (low, top), size * rng.uniform(0.5, 0.9), size)
+    solid += rod(0, 0, (low, top), size * draws.number("crown", (0.5, 0.9)), size)
     solid += dome(size, top - 1e-4, 0.25 * tall)
     return solid + tube([(0, 0, middle), (-reach, 0, middle - droop * reach)], [r, 0.8 * r], 10)
 
 
+@deferred
 def grip_loop(points: ArrayLike, wide: float, thick: float) -> Solid:
     """Flat strap along points (N, 2) in X and Z, as a jug's handle; half extents along Y and across."""
     path = np.asarray(points, dtype=np.float64)
