@@ -80,7 +80,7 @@ def _hand_truck(draws: Draws) -> Assembly:
     body = union(tube([(0.0, s * half, 0.02), (0.0, s * half, height)], r, 10) for s in (-1.0, 1.0))
     for share in np.linspace(0.08, 0.95 if slides else 0.75, draws.integer("crossbars", 3, 5)).tolist():
         z = share * height
-        bulge = {"straight": 0.0, "bowed": 0.03}[draws.pick("crossbar", ["straight", "bowed"])]
+        bulge = {"straight": 0.0, "bowed": 0.03}[draws.pick("crossbar_shape", ["straight", "bowed"])]
         body += tube([(0.0, -half, z), (bulge, -0.4 * half, z), (bulge, 0.4 * half, z), (0.0, half, z)], 0.75 * r, 8)
     if draws.chance("back_plate", 0.4):
         body += box(0.003, 0.3 * half, (0.08 * height, 0.75 * height))
@@ -160,7 +160,7 @@ def _service_trolley(draws: Draws) -> Assembly:
             drawer = box((-depth - face, -depth - GAP), half - 0.002, (z0, z1))
             tall = max(0.75 * (z1 - z0 - 0.012), 0.01)
             drawer += tray((-depth - 0.006, -inner, z0 + 0.004), (depth - wall - 0.02, inner, z0 + 0.004 + tall), 0.005)
-            span = half * draws.number("handle_length", (0.25, 0.6))
+            span = half * draws.number("drawer_handle_length", (0.25, 0.6))
             z = 0.5 * (z0 + z1)
             drawer += front_handle(kind, (-depth - face, -span, z), (-depth - face, span, z), 0.03, 0.005)
             travel = 2.0 * depth * draws.number("drawer_travel", (0.4, 0.8))

@@ -116,7 +116,7 @@ def _crossed(draws: Draws) -> Assembly:
     # The back rest is in the upper part of the frame, so that the seat has room below it.
     thick = draws.length("back_thickness", (0.012, 0.03))
     back_low = max(0.35 * above, 0.12)
-    tall = (above - back_low) * draws.number("back_height", (0.5, 1.0))
+    tall = (above - back_low) * draws.number("back_share", (0.5, 1.0))
     panel = _panel(draws.within("back"), (-0.5 * thick, -half, above - tall), (0.5 * thick, half, above), 2)
     frame_solid += panel.turned(SIDE, lean - bend).moved(joint_at)
     chair = Assembly("frame", frame_solid, 900.0)
@@ -143,8 +143,8 @@ def _crossed(draws: Draws) -> Assembly:
 
     seat_half = inner - bar.thick - GAP
     hinge_x = joint_at[0] - 0.012 - bar.deep
-    low, high = (hinge_x - depth, -seat_half, seat_low), (hinge_x, seat_half, seat_low + seat_thick)
-    seat = _panel(draws.within("seat"), low, high, 0)
+    near, far = (hinge_x - depth, -seat_half, seat_low), (hinge_x, seat_half, seat_low + seat_thick)
+    seat = _panel(draws.within("seat"), near, far, 0)
     swing = np.pi / 2 + (lean - bend) - 0.08 - float(arctan2(0.5 * seat_thick + thick + 0.02, back_low))
     how = draws.pick("seat_moves", {"follows": 0.4, "free": 0.45, "barely": 0.15})
     if how == "barely":
@@ -189,8 +189,8 @@ def _under(draws: Draws) -> Assembly:
         hinge = np.array([x1 + rail + GAP + 0.012, 0.0, seat_z + thick + 0.012])
         back_thick = draws.length("back_thickness", (0.012, 0.03))
         wide = half - 0.01
-        low, high = hinge + (-0.5 * back_thick, -wide, 0.05), hinge + (0.5 * back_thick, wide, tall)
-        back = _panel(draws.within("back"), low, high, 2)
+        near, far = hinge + (-0.5 * back_thick, -wide, 0.05), hinge + (0.5 * back_thick, wide, tall)
+        back = _panel(draws.within("back"), near, far, 2)
         for y in (bar.thick - wide, wide - bar.thick):
             back += bar.between(hinge + (0, y, 0), hinge + (0, y, tall - 0.02))
         lean = draws.angle("back_lean", (0.08, 0.6))
@@ -238,7 +238,7 @@ def _tip_up(draws: Draws) -> Assembly:
         seat += rod(at[0], (a + GAP, b - GAP), at[2], 0.012, sections=12)
         room = x1 + 0.01 - hinge_x
         limit = np.pi / 2 - max(0.0, (0.5 * thick + 0.006 - room)) / 0.1 - 0.05
-        joint = revolute("frame", SIDE, at, 0.0, min(limit, 1.45) * draws.number("seat_angle", (0.9, 1.0)))
+        joint = revolute("frame", SIDE, at, 0.0, min(limit, 1.45) * draws.number("seat_turn", (0.9, 1.0)))
         chair.add(f"seat_{k}" if count > 1 else "seat", seat, joint, density=400.0)
     chair.body = body
     return chair

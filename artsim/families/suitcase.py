@@ -52,7 +52,7 @@ def _shells(draws: Draws, x: float, y: float, low: float, high: float, seam: flo
 def _trolley(draws: Draws) -> Assembly:
     """A case on wheels that stands on its narrow side."""
     y, x = 0.5 * draws.length("width", (0.32, 0.52)), 0.5 * draws.length("depth", (0.2, 0.32))
-    lift = draws.length("lift", (0.045, 0.06))
+    lift = draws.length("clearance", (0.045, 0.06))
     high = lift + 2 * y * draws.number("height", (1.35, 1.65))
     seam = {"equal": 0.0, "shallow_lid": -0.45 * x}[draws.pick("shells", ["equal", "shallow_lid"])]
     front, back = _shells(draws, x, y, lift, high, seam)

@@ -60,7 +60,7 @@ def _pedal_bin(draws: Draws, can: Assembly, size: Bin) -> None:
     x, seam = size.x, size.height + GAP
     hinge = (x + 0.013, 0.0, seam)
     half = 0.4 * (size.y - 0.5 * size.radius)
-    rise = max(draws.number("lid_height", (0.08, 0.6), (0.03, 0.8), tails=0.3) * min(size.x, size.y), 0.006)
+    rise = max(draws.number("lid_rise", (0.08, 0.6), (0.03, 0.8), tails=0.3) * min(size.x, size.y), 0.006)
     edges = {"sharp": 0.25, "bevelled": 0.7, "domed": 1.0}
     inset = edges[draws.pick("lid_edge", list(edges))] * rise
     profile = [(0.0, inset), (0.12, 0.45 * inset), (0.5, 0.06 * inset), (1.0, 0.0)]
