@@ -73,7 +73,7 @@ def _pedal_bin(draws: Draws, can: Assembly, size: Bin) -> None:
     falls = draws.chance("falls_over", 0.35)  # over the back, past the upright, as far as the hinge lets it
     turned_over = 180.0 if draws.chance("half_turn", 0.5) else draws.degrees("fall_angle", (110.0, 205.0))
     limit = np.deg2rad(turned_over if falls else draws.degrees("lid_angle", (60.0, 110.0)))
-    if draws.chance("without_pedal", 0.7 if falls else 0.25):
+    if not draws.chance("pedal", 0.3 if falls else 0.75, upper=True):
         if draws.chance("lip", 0.6):  # to lift it by
             lip = (-x - draws.length("lip_length", (0.015, 0.03)), -0.4 * half, seam + 0.002)
             lid += box(lip, (-x + 0.002, 0.4 * half, seam + 0.008), fillet=0.003).called("handle", FRONT)
