@@ -175,14 +175,24 @@ def _under(draws: Draws) -> Assembly:
         solid = union(bar.between((x, t * y, knee), (x + slope * knee, t * y, 0.0)) for t in (-1, 1))
         z = knee * draws.number(f"{name}_stretcher", (0.15, 0.6))
         solid += bar.across(x + slope * (knee - z), z, y)
-        legs.append((name, solid, way, (x, 0.0, knee), float(hypot(knee, slope * knee)), slope))
+        legs.append((name, solid, way, (x, 0.0, knee), float(hypot(knee, slope * knee)), slope, knee - z))
         for t in (-1, 1):  # lugs
             seat += box(about(x, 0.02), about(t * y, bar.thick), (under + 0.001, seat_z + 0.002))
     chair = Assembly("seat", seat, 600.0)
-    for name, solid, way, at, length, slope in legs:
+    bar_at = np.zeros(2)  # X and Z of the front legs' stretcher, folded, before which the rear legs stop
+    for name, solid, way, at, length, slope, below in legs:
         # They stop a little below the seat; those in front fold back, those behind fold forward, to the inside.
-        limit = 0.45 * (np.pi / 2 - way * float(arctan2(slope, 1.0)) - 0.12 - 2.0 * rail / length)
+        slant = way * float(arctan2(slope, 1.0))
+        limit = 0.45 * (np.pi / 2 - slant - 0.12 - 2.0 * rail / length)
         limit *= 1.0 if draws.chance(f"{name}_fold_flat", 0.7) else draws.number(f"{name}_fold", (0.5, 1.0))
+        if name == "front_legs":
+            reach = hypot(below, slope * below)
+            bar_at = np.array([at[0] + reach * sin(limit + slant), knee - reach * cos(limit + slant)])
+        else:
+            ahead, down = at[0] - bar_at[0], knee - bar_at[1]
+            away, clear = float(hypot(ahead, down)), bar.deep + 1.5 * min(bar.thick, bar.deep) + GAP
+            if away < length + clear:
+                limit = min(limit, float(arctan2(ahead, down)) - clear / away - slant)
         chair.add(name, solid, revolute("seat", -way * SIDE, at, 0.0, limit), density=900.0)
     if draws.chance("back", 0.85):
         tall = draws.length("back_height", (0.25, 0.65))
