@@ -51,10 +51,13 @@ def moulded(levels: Sequence[Level], outline: Array, shift: float = 0.0) -> Soli
     """
     angles = (np.arange(len(outline)) + 0.5) * (2.0 * np.pi / len(outline))
     circle = np.stack([cos(angles), sin(angles)], axis=1)
+    # Points between the corners of a flat side may cost a hull one of its corners.
+    before, after = outline - np.roll(outline, 1, axis=0), np.roll(outline, -1, axis=0) - outline
+    corners = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]) > 1e-9
     rings = []
     for z, x, y, roundness in levels:
         plane = ((1.0 - roundness) * outline + roundness * circle) * (x, y) + ((1.0 - roundness) * shift, 0.0)
-        rings.append(lifted(plane, z))
+        rings.append(lifted(plane[corners] if roundness == 0 else plane, z))
     return loft(rings)
 
 
