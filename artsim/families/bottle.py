@@ -28,13 +28,12 @@ CLOSURES = {"screw_cap": 0.34, "pump": 0.15, "flip_top": 0.16, "stopper": 0.12, 
 
 @dataclass(frozen=True)
 class Mouth:
-    """The neck of a bottle: outer radius, bore, height of its foot and of its rim; half depth of the shoulder."""
+    """The neck of a bottle: outer radius, bore, height of its foot and of its rim."""
 
     radius: float
     bore: float
     foot: float
     rim: float
-    shoulder: float
 
 
 def build(draws: Draws) -> Assembly:
@@ -67,17 +66,14 @@ def _body(draws: Draws, shape: str, wide: bool, tall: float) -> tuple[Solid, Mou
     slender = shape in ("wine", "beer")
     if slender:
         radius = 0.34 * small
-    foot = height
     levels = [(z * height, x * depth, x * half, r) for z, x, r in _profile(draws, shape)]
-    lead = 1.15 * radius
-    last = levels[-1]
+    lead, last = 1.15 * radius, levels[-1]
     rise = 0.004 if slender else draws.number("shoulder_rise", (0.1, 0.5)) * small
-    levels.append((foot + rise, min(lead, last[1]), min(lead, last[2]), 1.0))
-    foot += rise
+    foot = height + rise
+    levels.append((foot, min(lead, last[1]), min(lead, last[2]), 1.0))
     if slender or draws.chance("long_neck", 0.12):
-        long = draws.number("neck_length", (0.5, 2.2)) * half
-        levels.append((foot + long, 1.04 * radius, 1.04 * radius, 1.0))
-        foot += long
+        foot += draws.number("neck_length", (0.5, 2.2)) * half
+        levels.append((foot, 1.04 * radius, 1.04 * radius, 1.0))
     plain = shape in ("shampoo", "water", "waist", "jar", "tube") and not wide
     shift = 0.0
     if plain and draws.chance("neck_aside", 0.2):  # a can
@@ -88,11 +84,16 @@ def _body(draws: Draws, shape: str, wide: bool, tall: float) -> tuple[Solid, Mou
     wall = radius * draws.number("neck_wall", (0.12, 0.25))
     rim = foot + max(tall, radius * draws.number("neck_height", (0.5, 1.1)))
     body += neck(radius, radius - wall, foot - 0.0005, rim)
-    mouth = Mouth(radius, radius - wall, foot, rim, last[1])
+    mouth = Mouth(radius, radius - wall, foot, rim)
     if plain and draws.chance("handle", 0.25):
         z0, z1 = sorted(draws.numbers("handle_ends", 0.15, 0.9, 2) * height)
         if z1 - z0 > 0.3 * height:
-            body += _jug_handle(draws, depth, half, z0, z1).moved((shift, 0, 0))
+            reach, root = depth + draws.length("handle_reach", (0.02, 0.035)), 0.45 * depth
+            upper, lower = z1 - 0.15 * (z1 - z0), z0 + 0.3 * (z1 - z0)
+            points = [(root, z1), (0.85 * reach, z1), (reach, upper), (reach, lower), (0.8 * reach, z0), (root, z0)]
+            wide = min(0.5 * draws.length("handle_width", (0.012, 0.024)), 0.5 * half)
+            grip = grip_loop(points, wide, 0.5 * draws.length("handle_thickness", (0.008, 0.012)))
+            body += grip.called("handle", -FRONT).moved((shift, 0, 0))
     if draws.chance("band", 0.2):  # a label or a moulded band
         z0 = draws.number("band_low", (0.2, 0.4)) * height
         z1 = z0 + draws.number("band_height", (0.1, 0.35)) * height
@@ -148,15 +149,6 @@ def _bevelled(levels: list[Level]) -> list[Level]:
     (z, x, y, r), top = levels[0], levels[1][0]
     cut = min(0.003, 0.3 * (top - z))
     return [(z, x - cut, y - cut, r), (z + cut, x, y, r), *levels[1:]]
-
-
-def _jug_handle(draws: Draws, depth: float, half: float, low: float, high: float) -> Solid:
-    reach = depth + draws.length("handle_reach", (0.02, 0.035))
-    root = 0.45 * depth
-    upper, lower = high - 0.15 * (high - low), low + 0.3 * (high - low)
-    points = [(root, high), (0.85 * reach, high), (reach, upper), (reach, lower), (0.8 * reach, low), (root, low)]
-    half = min(0.5 * draws.length("handle_width", (0.012, 0.024)), 0.5 * half)
-    return grip_loop(points, half, 0.5 * draws.length("handle_thickness", (0.008, 0.012))).called("handle", -FRONT)
 
 
 def _closing(draws: Draws, mouth: Mouth, height: float) -> JointSpec:

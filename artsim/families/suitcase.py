@@ -69,7 +69,10 @@ def _trolley(draws: Draws) -> Assembly:
         start, end = ((middle, -side * y, center + t * 0.07) for t in (-1, 1))
         back += bow_handle(start, end, (0, -side, 0), 0.03, 0.007)
     half = draws.number("handle_width", (0.35, 0.6)) * y
-    back += _housing(x, half, lift, high)
+    # Cover behind the back, open at the top, in which the telescopic handle slides.
+    y_side, z0, z1 = half + 0.016, lift + 0.02, high - 0.01
+    back += box((x + 0.019, x + 0.023), y_side, (z0, z1)) + box((x - 0.002, x + 0.02), y_side, (z0, z0 + 0.012))
+    back += union(box((x - 0.002, x + 0.0225), about(s * y_side, 0.002), (z0, z1)) for s in (-1, 1))
 
     wheel_x = x - 0.05
     front_x = -wheel_x if seam == 0.0 else seam + 0.04
@@ -94,19 +97,12 @@ def _trolley(draws: Draws) -> Assembly:
     for number, (px, py, parent) in enumerate(places):
         _caster(case, number, px, py, lift - 0.003, parent)
     if not spinner:
-        for number, s in enumerate((-1.0, 1.0)):
+        for s in (-1.0, 1.0):
             radius = 0.5 * (lift - 0.004)
             axle = np.array([wheel_x, s * (y - 0.04), radius])
             roll = cylinder(axle - (0, 0.0165, 0), axle + (0, 0.0165, 0), radius, sections=24)
-            case.add(f"wheel_{number}", roll, continuous("body", SIDE, axle), density=900.0)
+            case.add_numbered("wheel", roll, continuous("body", SIDE, axle), density=900.0)
     return case
-
-
-def _housing(x: float, half: float, low: float, high: float) -> Solid:
-    """Cover behind the back, open at the top, in which the telescopic handle slides."""
-    y, z0, z1 = half + 0.016, low + 0.02, high - 0.01
-    solid = box((x + 0.019, x + 0.023), y, (z0, z1)) + box((x - 0.002, x + 0.02), y, (z0, z0 + 0.012))
-    return solid + union(box((x - 0.002, x + 0.0225), about(s * y, 0.002), (z0, z1)) for s in (-1, 1))
 
 
 def _telescope(draws: Draws, case: Assembly, x: float, half: float, low: float, high: float) -> None:

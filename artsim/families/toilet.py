@@ -266,7 +266,9 @@ def _seat_and_lid(
         near, far = y - half / 2 + 0.001, y + half / 2 - 0.001
         seat += box((edge - 0.06, axis_x), (near, far), (low + 0.15 * cover.thick, low + 0.85 * cover.thick))
         seat += rod(axis_x, (near, far), at, 0.45 * cover.thick, sections=14)
-    lid = _lid(draws, long, wide, power, top + GAP, cover.lid)
+    scale, bevel = draws.number("lid_size", (0.96, 1.02)), draws.number("lid_bevel", (0.02, 0.25))
+    levels = ((1.0, top + GAP), (1.0, top + GAP + 0.6 * cover.lid), (1.0 - bevel, top + GAP + cover.lid))
+    lid = loft([_oval(share * (scale * long), share * (scale * wide), power, z) for share, z in levels])
     upright = (top + GAP, top + GAP + 0.5 * cover.lid)
     for y in (-apart - half, apart + half):  # arms from the plate down to the axis, beside the seat's
         near, far = y - half / 2 + 0.001, y + half / 2 - 0.001
@@ -298,12 +300,3 @@ def _ring(draws: Draws, long: float, wide: float, power: float, low: float, top:
     inner = (_oval(inner_long, inner_wide, 2.0, low, 0.01), _oval(1.03 * inner_long, 1.03 * inner_wide, 2.0, top, 0.01))
     first = _AROUND // 2 + 2
     return _rim(outer, inner, first, first + _AROUND - 4) if draws.chance("open_seat", 0.2) else _rim(outer, inner)
-
-
-def _lid(draws: Draws, long: float, wide: float, power: float, low: float, thick: float) -> Solid:
-    """A plate whose upper edge is bevelled."""
-    scale = draws.number("lid_size", (0.96, 1.02))
-    long, wide = scale * long, scale * wide
-    bevel = draws.number("lid_bevel", (0.02, 0.25))
-    levels = ((1.0, low), (1.0, low + 0.6 * thick), (1.0 - bevel, low + thick))
-    return loft([_oval(share * long, share * wide, power, z) for share, z in levels])

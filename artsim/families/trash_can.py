@@ -38,21 +38,17 @@ def build(draws: Draws) -> Assembly:
     if kind == "wheelie":
         return _wheelie(draws)
     size = Bin(draws)
-    can = Assembly("body", _body(draws, size), 500.0)
-    {"pedal": _pedal_bin, "swing": _swinging_flap, "halves": _two_lids}[kind](draws, can, size)
-    return can
-
-
-def _body(draws: Draws, size: Bin) -> Solid:
-    x, y, top = size.x, size.y, size.height
-    body = rounded_tray((-x, -y, size.foot), (x, y, top), 0.003, size.radius, [(0.0, size.taper), (1.0, 0.0)],
-                        steps=size.steps)  # fmt: skip
+    x, y, top, radius = size.x, size.y, size.height, size.radius
+    sides = [(0.0, size.taper), (1.0, 0.0)]
+    body = rounded_tray((-x, -y, size.foot), (x, y, top), 0.003, radius, sides, steps=size.steps)
     out = {"wide": 0.004, "narrow": -0.006}[draws.pick("base", ["wide", "narrow"])] - size.taper
-    body += box(x + out, y + out, (0, size.foot + 0.002), fillet=size.radius, axis=2, steps=size.steps)
+    body += box(x + out, y + out, (0, size.foot + 0.002), fillet=radius, axis=2, steps=size.steps)
     if draws.chance("collar", 0.5):  # around the opening
         low = (-x - 0.003, -y - 0.003, top - draws.length("collar_height", (0.01, 0.04)))
-        body += rounded_tray(low, (x + 0.003, y + 0.003, top), 0.005, size.radius, floor=0.0, steps=size.steps)
-    return body
+        body += rounded_tray(low, (x + 0.003, y + 0.003, top), 0.005, radius, floor=0.0, steps=size.steps)
+    can = Assembly("body", body, 500.0)
+    {"pedal": _pedal_bin, "swing": _swinging_flap, "halves": _two_lids}[kind](draws, can, size)
+    return can
 
 
 def _pedal_bin(draws: Draws, can: Assembly, size: Bin) -> None:
@@ -114,12 +110,12 @@ def _two_lids(draws: Draws, can: Assembly, size: Bin) -> None:
     seam, thick = size.height + GAP, draws.length("lid_thickness", (0.006, 0.012))
     limit = np.deg2rad(draws.degrees("lid_angle", (70.0, 95.0)))
     whole = box(size.x, size.y, (seam, seam + thick), fillet=size.radius, axis=2, steps=6)
-    for number, s in enumerate((1.0, -1.0)):
+    for s in (1.0, -1.0):
         hinge = s * (size.y + 0.009)
         barrel = 0.25 * size.x
         lid = _half_of(whole, s) + rod((-barrel, barrel), hinge, seam + 0.001, 0.0045, sections=12)
         lid += box(barrel, ends((hinge, s * 0.9 * size.y)), (seam + 0.0005, seam + 0.005))
-        can.add(f"lid_{number}", lid, revolute("body", (-s, 0, 0), (0, hinge, seam), 0.0, limit))
+        can.add_numbered("lid", lid, revolute("body", (-s, 0, 0), (0, hinge, seam), 0.0, limit))
 
 
 @deferred
@@ -160,10 +156,10 @@ def _wheelie(draws: Draws) -> Assembly:
     angles = (75.0, 108.0) if draws.chance("lid_stops", 0.6) else (108.0, 205.0)
     limit = np.deg2rad(draws.degrees("lid_angle", angles))
     can.add("lid", lid, revolute("body", SIDE, hinge, 0.0, limit))
-    for number, s in enumerate((1.0, -1.0)):
+    for s in (1.0, -1.0):
         near, far = s * inner, s * (inner + wide)
         tyre = rod(axle[0], (near, far), wheel, wheel, sections=28)
         tyre += rod(axle[0], (far - s * 0.001, far + s * 0.008), wheel, 0.45 * wheel, 0.3 * wheel, 20)
         turn = continuous("body", SIDE, (axle[0], 0.5 * (near + far), wheel))
-        can.add(f"wheel_{number}", tyre, turn, density=900.0)
+        can.add_numbered("wheel", tyre, turn, density=900.0)
     return can
