@@ -91,8 +91,8 @@ def _body(draws: Draws, shape: str, wide: bool, tall: float) -> tuple[Solid, Mou
             reach, root = depth + draws.length("handle_reach", (0.02, 0.035)), 0.45 * depth
             upper, lower = z1 - 0.15 * (z1 - z0), z0 + 0.3 * (z1 - z0)
             points = [(root, z1), (0.85 * reach, z1), (reach, upper), (reach, lower), (0.8 * reach, z0), (root, z0)]
-            wide = min(0.5 * draws.length("handle_width", (0.012, 0.024)), 0.5 * half)
-            grip = grip_loop(points, wide, 0.5 * draws.length("handle_thickness", (0.008, 0.012)))
+            broad = min(0.5 * draws.length("handle_width", (0.012, 0.024)), 0.5 * half)
+            grip = grip_loop(points, broad, 0.5 * draws.length("handle_thickness", (0.008, 0.012)))
             body += grip.called("handle", -FRONT).moved((shift, 0, 0))
     if draws.chance("band", 0.2):  # a label or a moulded band
         z0 = draws.number("band_low", (0.2, 0.4)) * height
