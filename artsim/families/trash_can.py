@@ -4,8 +4,12 @@ Round or rectangular, low to slim and tall, straight or tapered; the lid turns a
 halves at the sides. A pedal follows the lid; wheelie bins have two wheels and a grip at the back.
 """
 
-import numpy as np
+from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import rounded_tray
 from artsim.making.assembly import Assembly, continuous, revolute
 from artsim.making.draws import Draws
@@ -64,11 +68,13 @@ def _pedal_bin(draws: Draws, can: Assembly, size: Bin) -> None:
                        size.radius, profile, side=-1, steps=size.steps)  # fmt: skip
     lid += box((x - 0.012, hinge[0]), half, (seam, seam + 0.007))
     lid += rod(hinge[0], (-half, half), seam + 0.002, 0.006, sections=12)
-    if draws.chance("hinge_housing", 0.6):
+    housing = draws.chance("hinge_housing", 0.6)
+    if housing:
         can.body += box((x - 0.006 - size.taper, x + 0.014), 0.8 * half, (size.height - 0.14, size.height - 0.02))
     falls = draws.chance("falls_over", 0.35)  # over the back, past the upright, as far as the hinge lets it
     turned_over = 180.0 if draws.chance("half_turn", 0.5) else draws.degrees("fall_angle", (110.0, 205.0))
     limit = np.deg2rad(turned_over if falls else draws.degrees("lid_angle", (60.0, 110.0)))
+    limit = min(limit, _turned_over(profile, 0.01, rise, 0.002 if housing else -0.009))
     if not draws.chance("pedal", 0.3 if falls else 0.75, upper=True):
         if draws.chance("lip", 0.6):  # to lift it by
             lip = (-x - draws.length("lip_length", (0.015, 0.03)), -0.4 * half, seam + 0.002)
@@ -88,6 +94,25 @@ def _pedal_bin(draws: Draws, can: Assembly, size: Bin) -> None:
     ratio = min(0.2, 0.8 * (middle - 0.006) / (base - tip)) / limit
     turn = revolute("body", (0, -1, 0), (base - 0.002, 0.0, middle), 0.0, ratio * limit, mimic=("lid", ratio))
     can.add("pedal", pedal, turn, density=800.0)
+
+
+def _turned_over(
+    profile: Sequence[tuple[float, float]], near: float, rise: float, back: float, grip: ArrayLike = ((9.0, 9.0),)
+) -> float:
+    """Angle up to which a lid clears the bin as it turns over the back; X and Z are those from the hinge.
+
+    ``profile`` is that of the lid, whose rim begins ``near`` before the hinge; it stays behind ``back``, and clear of
+    the points (N, 2) of a grip.
+    """
+    shares = np.linspace(0.0, 1.0, 50)
+    edge = -near - np.interp(shares, *np.transpose(profile))
+    x, z = np.append(edge, edge[0] - 0.15 * shares), rise * np.append(1.0 - shares, np.ones(50))
+    angles = np.deg2rad(np.arange(60.0, 206.0))[:, None]
+    along, up = x * cos(angles) + z * sin(angles), z * cos(angles) - x * sin(angles)
+    clear = ((along > back) | (up > 0.0)).all(axis=1)
+    for px, pz in np.asarray(grip):
+        clear &= (hypot(along - px, up - pz) > 0.017).all(axis=1)
+    return float(angles[-1 if clear.all() else int(np.argmin(clear)) - 1, 0])
 
 
 def _swinging_flap(draws: Draws, can: Assembly, size: Bin) -> None:
@@ -155,6 +180,8 @@ def _wheelie(draws: Draws) -> Assembly:
     lid += rod(hinge[0], (-0.6 * y, 0.6 * y), seam + 0.002, 0.008, sections=12)
     angles = (75.0, 108.0) if draws.chance("lid_stops", 0.6) else (108.0, 205.0)
     limit = np.deg2rad(draws.degrees("lid_angle", angles))
+    over = np.linspace((-0.012, grip_z - 0.02 - seam), (grip_x - hinge[0], grip_z - seam), 8)
+    limit = min(limit, _turned_over(shape, 0.012, rise, -0.011, over))
     can.add("lid", lid, revolute("body", SIDE, hinge, 0.0, limit))
     for s in (1.0, -1.0):
         near, far = s * inner, s * (inner + wide)
