@@ -28,12 +28,16 @@ CLOSURES = {"screw_cap": 0.34, "pump": 0.15, "flip_top": 0.16, "stopper": 0.12, 
 
 @dataclass(frozen=True)
 class Mouth:
-    """The neck of a bottle: outer radius, bore, height of its foot and of its rim."""
+    """The neck of a bottle: outer radius, bore, height of its foot and of its rim.
+
+    ``shoulder`` is the height up to which a body stands out on one side, where its neck is not in its middle.
+    """
 
     radius: float
     bore: float
     foot: float
     rim: float
+    shoulder: float
 
 
 def build(draws: Draws) -> Assembly:
@@ -84,7 +88,7 @@ def _body(draws: Draws, shape: str, wide: bool, tall: float) -> tuple[Solid, Mou
     wall = radius * draws.number("neck_wall", (0.12, 0.25))
     rim = foot + max(tall, radius * draws.number("neck_height", (0.5, 1.1)))
     body += neck(radius, radius - wall, foot - 0.0005, rim)
-    mouth = Mouth(radius, radius - wall, foot, rim)
+    mouth = Mouth(radius, radius - wall, foot, rim, height if shift else 0.0)
     if plain and draws.chance("handle", 0.25):
         z0, z1 = sorted(draws.numbers("handle_ends", 0.15, 0.9, 2) * height)
         if z1 - z0 > 0.3 * height:
@@ -235,7 +239,7 @@ def _flip_top(draws: Draws, bottle: Assembly, mouth: Mouth) -> None:
     z = base + r
     lid += rod(x, (-half, half), z, r, sections=12)
     lid += box((0.8 * radius, x), half, (base, base + 1.6 * r))
-    roots = (0.7 * radius, x), (high - 2.5 * r, high - r)
+    roots = (0.7 * radius, x), (max(high - 2.5 * r, mouth.rim + GAP), high - r)
     collar += cheeks((x, z), r, half + 0.0006, half + 0.0006 + 1.5 * r, *roots, 10)
     if draws.chance("thumb_rest", 0.6):  # at the front
         along = (-0.98 * radius - 0.2 * radius, -0.9 * (0.98 * radius))
@@ -288,8 +292,8 @@ def _sprayer(draws: Draws, bottle: Assembly, mouth: Mouth) -> None:
     middle = 0.5 * (deck + top)
     head += rod((-reach - 0.35 * radius, -reach + 0.002), 0, middle, nozzle, 1.2 * nozzle, 6)
     x = -0.72 * reach
-    length = radius * draws.number("trigger_length", (1.4, 2.4))
     z = deck - 0.0018
+    length = min(radius * draws.number("trigger_length", (1.4, 2.4)), z - mouth.shoulder - 0.002)
     thin = 0.45 * wide
     points = [(x, z - 0.001), (x - 0.12 * length, z - 0.4 * length), (x - 0.05 * length, z - 0.75 * length),
               (x - 0.3 * length, z - length)]  # fmt: skip
