@@ -219,7 +219,6 @@ def _wheelbarrow(draws: Draws) -> Assembly:
     thick = 0.005
     inner, back = half - flare, length - 0.6 * flare
     front = -draws.length("tray_lean", (0.0, 0.15))
-    draws.rng.random()
     floor = [np.array([x, y, low]) for x, y in ((flare, -inner), (flare, inner), (back, inner), (back, -inner))]
     plan = ((front, -0.85 * half), (front, 0.85 * half), (length, half), (length, -half))
     rim = [np.array([x, y, low + deep]) for x, y in plan]

@@ -74,10 +74,7 @@ def wagon(draws: Draws) -> Assembly:
 
 def hand_cart(draws: Draws) -> Assembly:
     """A box or a bed between two large wheels, with shafts to the front, and by chance a tailgate that folds down."""
-    wheels = Wheels(draws, (0.2, 0.45), (0.03, 0.07))
-    wheels.style = draws.pick("large_wheel_style", ["spokes", "spokes", "rim"])
-    wheels.spokes = draws.integer("large_wheel_spokes", 6, 10)
-    wheels.hub = wheels.radius * draws.number("large_wheel_hub", (0.12, 0.25))
+    wheels = Wheels(draws, (0.2, 0.45), (0.03, 0.07), large=True)
     length, half = draws.length("depth", (0.8, 1.5)), 0.5 * draws.length("width", (0.56, 1.0))
     low = wheels.radius + draws.length("floor_lift", (-0.02, 0.12))
     tall = draws.length("side_height", (0.12, 0.45)) if draws.chance("side", 0.7) else 0.0

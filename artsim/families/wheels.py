@@ -20,15 +20,15 @@ ROLL = np.array([0.0, -1.0, 0.0])
 class Wheels:
     """The wheels of one cart: all of one form, numbered as they come.
 
-    Radius and width are drawn from two ranges; the radius is at most ``most``.
+    Radius and width are drawn from two ranges; the radius is at most ``most``. Large wheels are those of hand carts.
     """
 
-    def __init__(self, draws: Draws, radius: Interval, wide: Interval, most: float = np.inf):
+    def __init__(self, draws: Draws, radius: Interval, wide: Interval, most: float = np.inf, large: bool = False):
         draws = draws.within("wheel")
         self.radius, self.wide = min(draws.length("radius", radius), most), draws.length("width", wide)
-        self.style = draws.pick("style", ["disc", "rim", "spokes"])
-        self.spokes = draws.integer("spokes", 3, 6)
-        self.hub = self.radius * draws.number("hub", (0.2, 0.45))
+        self.style = draws.pick("style", ["rim", "spokes", "spokes"] if large else ["disc", "rim", "spokes"])
+        self.spokes = draws.integer("spokes", *((6, 10) if large else (3, 6)))
+        self.hub = self.radius * draws.number("hub", (0.12, 0.25) if large else (0.2, 0.45))
         self.sections = 20 if self.radius > 0.1 else 14  # small wheels need fewer to look round
         self.count = 0
 
