@@ -7,7 +7,7 @@ the one that is drawn; the generator moves on as if nothing had been asked, so t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
@@ -24,6 +24,7 @@ Wanted = Value | Interval | frozenset[str]
 """What is asked for: one value, a range, or one of several options."""
 Choice = TypeVar("Choice")
 _SEEDS = 2**31
+_TRIES = 1000
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,20 @@ class Draws:
         """Forget what was drawn, for a family that draws the whole object anew: names begin at their first."""
         self._trace.drawn.clear()
         self._trace.counts.clear()
+
+    def tries(self) -> Iterator[Draws]:
+        """These draws until what is drawn fits: the draws of each try take the place of those of the one before.
+
+        Raises
+        ------
+        UnmetError
+            After a thousand: what is asked for never fits.
+        """
+        counts, drawn = dict(self._trace.counts), dict(self._trace.drawn)
+        for _ in range(_TRIES):
+            self._trace.counts, self._trace.drawn = dict(counts), dict(drawn)
+            yield self
+        raise UnmetError(*list(self._trace.drawn.items())[-1])
 
     def _child(self, rng: Rng, name: str) -> Draws:
         child = Draws.__new__(Draws)
