@@ -13,7 +13,8 @@ from artsim.common.elementary import arcsin, arctan2, cos, sin
 from artsim.common.products import apply
 from artsim.families.clearance import Link, narrow_limits
 from artsim.families.standing_lamp import spotlight, standing
-from artsim.making.assembly import Assembly, Rng, continuous, pick, revolute
+from artsim.making.assembly import Assembly, continuous, revolute
+from artsim.making.draws import Draws
 from artsim.making.outlines import SIDE, UP
 from artsim.making.solids import box, cylinder, ellipsoid, hull_of, revolved, rod, tube, union
 from artsim.model.kinematics import Array
@@ -22,15 +23,16 @@ from artsim.model.transforms import rotation_about
 GAP = 0.001
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """A lamp; what leans, leans forward to -X at rest."""
-    return pick(rng, {_desk: 0.5, standing: 0.32, spotlight: 0.18})(rng)
+    makers = {"desk": _desk, "standing": standing, "spotlight": spotlight}
+    return makers[draws.pick("kind", {"desk": 0.5, "standing": 0.32, "spotlight": 0.18})](draws)
 
 
-def _desk(rng: Rng) -> Assembly:
+def _desk(draws: Draws) -> Assembly:
     """Base, arms and shade."""
-    while True:
-        links, half, r, foot = _links(rng)
+    for again in draws.tries():
+        links, half, r, foot = _links(again)
         if narrow_limits(links, 0.02):
             break
     lamp = Assembly(density=1200.0)
@@ -41,12 +43,12 @@ def _desk(rng: Rng) -> Assembly:
     return lamp
 
 
-def _links(rng: Rng) -> tuple[list[Link], float, float, Array | None]:
+def _links(draws: Draws) -> tuple[list[Link], float, float, Array | None]:
     """All links, half width and radius of their knuckles, and the foot of the parallel rod, if there is one."""
-    half, r = rng.uniform(0.006, 0.009), rng.uniform(0.010, 0.015)
+    half, r = draws.length("arm_radius", (0.006, 0.009)), draws.length("knuckle_radius", (0.010, 0.015))
     links = [Link("base")]
-    top = _base(rng, links[0], r)
-    if rng.random() < 0.6:
+    top = _base(draws, links[0], r)
+    if draws.chance("turret", 0.6):
         links.append(Link("turret", continuous("base", UP, (0, 0, top))))
         top += GAP
         links[-1].rod((0, 0, top), (0, 0, top + 0.012), 1.3 * r)
@@ -54,13 +56,13 @@ def _links(rng: Rng) -> tuple[list[Link], float, float, Array | None]:
     links[-1].rod((0, 0, top + (0.003 if len(links) > 1 else -0.003)), at, 0.8 * half)
     links[-1].rod(at - half * SIDE, at + half * SIDE, r)
 
-    double, sprung = rng.random() < 0.45, rng.random() < 0.4
-    arms = 3 if rng.random() < 0.2 else 2
-    names = ["lower_arm", "upper_arm"] if arms == 2 else ["lower_arm", "middle_arm", "upper_arm"]
-    angles = np.deg2rad([rng.uniform(5, 40), rng.uniform(-100, -55), rng.uniform(-30, 40)])  # from the link before
-    angle, side = 0.0, float(rng.choice([-1.0, 1.0]))
+    double, sprung = draws.chance("arms_doubled", 0.45), draws.chance("springs", 0.4)
+    names = ["lower_arm", *(["middle_arm"] if draws.chance("middle_arm", 0.2) else []), "upper_arm"]
+    leans = {"lower_arm": (5.0, 40.0), "second_arm": (-100.0, -55.0), "third_arm": (-30.0, 40.0)}
+    angles = np.deg2rad([draws.degrees(f"{arm}_angle", usual) for arm, usual in leans.items()])  # from the link before
+    angle, side = 0.0, draws.side("arms_side")
     foot = None
-    if rng.random() < 0.35:  # a lug behind the knuckle carries the parallel rod
+    if draws.chance("rod", 0.35):  # a lug behind the knuckle carries the parallel rod
         foot = at + (2.4 * r, 0, 0)
         ends = [cylinder(p - half * SIDE, p + half * SIDE, q, sections=16) for p, q in ((at, r), (foot, 0.7 * r))]
         links[-1].solid += hull_of(*ends)
@@ -73,16 +75,17 @@ def _links(rng: Rng) -> tuple[list[Link], float, float, Array | None]:
         if k == 0:  # stay clear of the base's disc
             lower, upper = np.deg2rad(-62) - angle, np.deg2rad(62) - angle
         else:
-            lower, upper = -np.deg2rad(rng.uniform(50, 85)), np.deg2rad(rng.uniform(50, 85))
+            lower = -np.deg2rad(draws.degrees(f"{name}_forward", (50.0, 85.0)))
+            upper = np.deg2rad(draws.degrees(f"{name}_backward", (50.0, 85.0)))
         links.append(Link(name, revolute(links[-1].name, SIDE, hinge, lower, upper)))
-        length = rng.uniform(0.2, 0.36) * (0.75 if arms == 3 else 1.0)
+        length = draws.length(f"{name}_length", (0.2, 0.36)) * (0.75 if len(names) == 3 else 1.0)
         if k == 0 and foot is not None:  # the rod stays within this distance
             links[-1].guard(at + 0.09 * _lean(angle), at + 0.9 * length * _lean(angle), 3.4 * r + 2.0 * half)
         at = _arm(links[-1], at, _lean(angle), length, half, r, double, sprung and k < 2)
-        if rng.random() < 0.7:
+        if draws.chance(f"{name}_sides_change", 0.7):
             side = -side
     at = at + side * (2.0 * half + GAP) * SIDE
-    _shade(rng, links, at, side, angle, half, r)
+    _shade(draws, links, at, side, angle, half, r)
     return links, half, r, foot
 
 
@@ -91,10 +94,10 @@ def _lean(angle: float) -> Array:
     return apply(rotation_about(SIDE, angle), UP)
 
 
-def _base(rng: Rng, link: Link, r: float) -> float:
+def _base(draws: Draws, link: Link, r: float) -> float:
     """The foot; returns the height of its top."""
-    wide, thick = rng.uniform(0.06, 0.1), rng.uniform(0.012, 0.03)
-    kind = pick(rng, {"disc": 0.4, "dome": 0.2, "square": 0.25, "clamp": 0.15})
+    wide, thick = draws.length("foot_radius", (0.06, 0.1)), draws.length("foot_thickness", (0.012, 0.03))
+    kind = draws.pick("foot", {"disc": 0.4, "dome": 0.2, "square": 0.25, "clamp": 0.15})
     if kind == "clamp":
         link.solid += box((-0.06, 0.035), 0.025, 0.012, fillet=0.004)
         link.solid += box((0.02, 0.035), 0.025, (-0.09, 0.0)) + box((-0.04, 0.03), 0.02, (-0.09, -0.078))
@@ -114,7 +117,7 @@ def _base(rng: Rng, link: Link, r: float) -> float:
         for angle in np.arange(8) * np.pi / 4.0:  # a rim of rods guards the disc
             out = np.array([cos(angle), sin(angle), 0.0])
             link.guard((0, 0, 0.5 * thick), wide * 1.1 * out + (0, 0, 0.5 * thick), 0.5 * thick)
-    post = rng.uniform(0.02, 0.045)
+    post = draws.length("post_height", (0.02, 0.045))
     link.solid += rod(0, 0, (0.002, thick + post), 1.25 * r)
     link.guard((0, 0, 0.002), (0, 0, thick + post - 0.7 * r), 1.25 * r)
     return thick + post
@@ -143,22 +146,24 @@ def _arm(
     return end
 
 
-def _shade(rng: Rng, links: list[Link], at: Array, side: float, arm_angle: float, half: float, r: float) -> None:
+def _shade(draws: Draws, links: list[Link], at: Array, side: float, arm_angle: float, half: float, r: float) -> None:
     """The last link: knuckle, stem and shade. It turns as far as its rim keeps clear of the arm."""
-    stem = rng.uniform(0.04, 0.06)
-    kind = pick(rng, {"cone": 0.45, "bell": 0.3, "panel": 0.25})
+    stem = draws.length("shade_stem", (0.04, 0.06))
+    kind = draws.pick("shade", {"cone": 0.45, "bell": 0.3, "panel": 0.25})
     if kind == "panel":
-        length, wide, deep = rng.uniform(0.16, 0.3), rng.uniform(0.016, 0.035), 0.012
+        length, wide = draws.length("shade_length", (0.16, 0.3)), 0.5 * draws.length("shade_width", (0.032, 0.07))
+        deep = 0.012
         outline = np.array([(0.6 * length, -0.003)])
     else:
-        rim, neck = rng.uniform(0.05, 0.085), rng.uniform(0.018, 0.026)
-        deep = rng.uniform(0.09, 0.15)
+        rim, neck = draws.length("shade_radius", (0.05, 0.085)), draws.length("neck_radius", (0.018, 0.026))
+        deep = draws.length("shade_depth", (0.09, 0.15))
         share, level = (0.55, 0.7) if kind == "cone" else (0.9, 0.6)
         outline = np.array([(neck, 0), (neck, 0.25 * deep), (neck + share * (rim - neck), level * deep), (rim, deep)])
     # Seen from its knuckle the shade takes up this angle to either side; the arm takes some as well.
     keep = float(arctan2(outline[:, 0], stem + outline[:, 1]).max()) + arcsin(min((r + 0.003) / stem, 1.0)) + 0.05
     # Down and forward, measured from the arm.
-    room = max((np.deg2rad(rng.uniform(-180, -140)) - arm_angle - np.pi) % (2.0 * np.pi), keep + 0.1)
+    room = np.deg2rad(draws.degrees("shade_angle", (-180.0, -140.0))) - arm_angle - np.pi
+    room = max(room % (2.0 * np.pi), keep + 0.1)
     along = _lean(arm_angle + np.pi + room)
 
     solid = cylinder(at - half * SIDE, at + half * SIDE, r, sections=18)
