@@ -291,7 +291,7 @@ def rounded_shell(low: Vector, high: Vector, wall: float, radius: float, steps: 
 @deferred
 def grid_panel(
     low: Vector, high: Vector, widths: Vector, columns: Vector, rows: Vector, bar: float, board: float,
-    bore: tuple[float, float, float] | None = None,
+    bore: tuple[float, float, float] | None = None, glass: bool = True,
 ) -> Solid:  # fmt: skip
     """Frame across the X axis with crossbars and a thinner board or pane between them: a door's leaf, a window's sash.
 
@@ -305,6 +305,8 @@ def grid_panel(
         Thickness of the board, in the middle of the frame's own.
     bore : 3 float, optional
         Y, Z and radius of a hole through one of the upright sides of the frame, as for a handle.
+    glass : bool
+        Mark the board as glass.
     """
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     inner_low = low + (0, widths[0], widths[2])
@@ -328,7 +330,8 @@ def grid_panel(
     middle = 0.5 * (low[0] + high[0])
     pane_low, pane_high = inner_low - 0.001, inner_high + 0.001
     pane_low[0], pane_high[0] = middle - board / 2, middle + board / 2
-    return solid + box(pane_low, pane_high)
+    pane = box(pane_low, pane_high)
+    return solid + (pane.called("glass", FRONT) if glass else pane)
 
 
 def swing_limits(near: float, reach: float) -> tuple[float, float]:
