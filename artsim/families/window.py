@@ -8,8 +8,9 @@ import numpy as np
 
 from artsim.families.details import bar_handle, grid_panel, swing_limits
 from artsim.families.fronts import HINGES
-from artsim.making.assembly import Assembly, Rng, pick, prismatic, revolute
-from artsim.making.outlines import about
+from artsim.making.assembly import Assembly, prismatic, revolute
+from artsim.making.draws import Draws
+from artsim.making.outlines import FRONT, SIDE, UP, about
 from artsim.making.solids import Solid, box, cylinder, frame
 from artsim.model.kinematics import Array
 
@@ -20,11 +21,11 @@ PANE = 0.006
 class _Style:
     """What the sashes of a window share."""
 
-    def __init__(self, rng: Rng, most: float) -> None:
-        self.thick = min(rng.uniform(0.03, 0.045), most)
-        self.columns = pick(rng, {1: 0.6, 2: 0.25, 3: 0.15})
-        self.rows = pick(rng, {1: 0.55, 2: 0.3, 3: 0.15})
-        self.rail = rng.uniform(0.035, 0.065)
+    def __init__(self, draws: Draws, most: float) -> None:
+        self.thick = min(draws.length("sash_thickness", (0.03, 0.045)), most)
+        self.columns = draws.pick("pane_columns", {1: 0.6, 2: 0.25, 3: 0.15})
+        self.rows = draws.pick("pane_rows", {1: 0.55, 2: 0.3, 3: 0.15})
+        self.rail = draws.length("sash_rail", (0.035, 0.065))
 
     def sash(self, low: Array, high: Array) -> Solid:
         """A sash with these corners: a frame around panes."""
@@ -33,76 +34,75 @@ class _Style:
         return grid_panel(low, high, [self.rail] * 4, columns, rows, 0.022, PANE)
 
 
-def build(rng: Rng) -> Assembly:
+def build(draws: Draws) -> Assembly:
     """A window, mostly closed at rest."""
-    kind = pick(rng, {"hinged": 0.6, "sliding": 0.22, "hung": 0.18})
-    count = pick(rng, {1: 0.4, 2: 0.4, 3: 0.2})
+    kind = draws.pick("kind", {"hinged": 0.6, "sliding": 0.22, "hung": 0.18})
+    count = draws.pick("lights", {1: 0.4, 2: 0.4, 3: 0.2})  # side by side, each with a sash or fixed
     if kind == "sliding":
         count = max(count, 2)
-    width = rng.uniform(0.35, 1.0) * (count if kind != "hung" else 1)
-    height = rng.uniform(0.5, 1.8) if kind != "hung" else width * rng.uniform(1.3, 2.0)
-    bar = rng.uniform(0.035, 0.065)
-    depth = rng.uniform(0.05, 0.22)
-    style = _Style(rng, 1.0 if kind == "hinged" else 0.035)
+    width = draws.length("width", (0.35, 1.0)) * (count if kind != "hung" else 1)  # drawn for one light
+    height = draws.length("height", (0.5, 1.8)) if kind != "hung" else width * draws.number("height", (1.3, 2.0))
+    bar = draws.length("frame_width", (0.035, 0.065))
+    depth = draws.length("depth", (0.05, 0.22))
+    style = _Style(draws, 1.0 if kind == "hinged" else 0.035)
     if kind != "hinged":
         depth = max(depth, (count if kind == "sliding" else 2) * (style.thick + GAP) + 0.015)
-    window = Assembly("frame", _frame(rng, width, height, depth, bar), 700.0)
+    window = Assembly("frame", _frame(draws, width, height, depth, bar), 700.0)
     if kind == "hung":
-        _hung(rng, window, width, height, depth, style)
+        _hung(draws, window, width, height, depth, style)
     else:
-        {"hinged": _hinged, "sliding": _sliding}[kind](rng, window, width, height, depth, style, count)
+        {"hinged": _hinged, "sliding": _sliding}[kind](draws, window, width, height, depth, style, count)
     return window
 
 
-def _frame(rng: Rng, width: float, height: float, depth: float, bar: float) -> Solid:
+def _frame(draws: Draws, width: float, height: float, depth: float, bar: float) -> Solid:
     """Frame around an opening of ``width`` x ``height`` above Z = 0, with a sill, a casing or a piece of wall."""
     x0, x1, y = -depth / 2, depth / 2, width / 2
     solid = frame((x0, -y - bar, -bar), (x1, y + bar, height + bar), [bar] * 4)
-    if rng.random() < 0.4:  # sill
-        out, over = rng.uniform(0.02, 0.12), rng.uniform(0.0, 0.08)
+    if draws.chance("sill", 0.4):
+        out, over = draws.length("sill_depth", (0.02, 0.12)), draws.length("sill_overhang", (0.0, 0.08))
         solid += box((x0 - out, x1), y + bar + over, (-bar - 0.02, -bar + 0.006), fillet=0.006, axis=1)
-    around = rng.random()
-    if around < 0.25:  # casing, level with the frame so that sashes can pass
-        wide = rng.uniform(0.04, 0.09)
-        solid += frame(
-            (x0, -y - bar - wide, -bar - wide), (x0 + 0.018, y + bar + wide, height + bar + wide), [wide + 0.001] * 4
-        )
-    elif around < 0.55:  # a piece of wall, on each side as wide as it happens to be
-        left, right, below, above = rng.uniform(0.05, 0.35 if around < 0.4 else 1.0, 4)
+    around = draws.pick("surround", {"casing": 0.25, "some wall": 0.15, "wall": 0.15, "none": 0.45})
+    if around == "casing":  # level with the frame so that sashes can pass
+        wide = draws.length("casing_width", (0.04, 0.09))
+        low, high = (x0, -y - bar - wide, -bar - wide), (x0 + 0.018, y + bar + wide, height + bar + wide)
+        solid += frame(low, high, [wide + 0.001] * 4)
+    elif around != "none":  # on each side as wide as it happens to be
+        left, right, below, above = draws.numbers("wall_width", 0.05, 1.0 if around == "wall" else 0.35, 4, unit="m")
         low, high = (x0 + 0.005, -y - bar - left, -bar - below), (x1 - 0.004, y + bar + right, height + bar + above)
         solid += frame(low, high, [w + 0.002 for w in (left, right, below, above)])
     return solid
 
 
-def _hinged(rng: Rng, window: Assembly, width: float, height: float, depth: float, style: _Style, count: int) -> None:
+def _hinged(
+    draws: Draws, window: Assembly, width: float, height: float, depth: float, style: _Style, count: int
+) -> None:
     """Lights side by side between mullions; each hinged or fixed. Two may meet without a mullion between them."""
     x0 = -depth / 2
-    mullion = rng.uniform(0.03, 0.06)
+    mullion = draws.length("mullion_width", (0.03, 0.06))
     top = height
-    if rng.random() < 0.2 and height > 0.9:  # a fixed light above
-        top = height * rng.uniform(0.68, 0.78)
+    if draws.chance("top_light", 0.2) and height > 0.9:  # fixed
+        top = height * draws.number("top_light_sill", (0.68, 0.78))
         window.body += box((x0, depth / 2), width / 2 + 0.001, (top, top + mullion))
-        window.body += box(PANE / 2, width / 2 + 0.001, (top, height + 0.001))
-    meeting = count == 2 and rng.random() < 0.45
+        window.body += box(PANE / 2, width / 2 + 0.001, (top, height + 0.001)).called("glass", FRONT)
+    meeting = count == 2 and draws.chance("sashes_meet", 0.45)
     edges = np.linspace(-width / 2, width / 2, count + 1)
-    sideways = rng.random() < 0.65 or meeting
-    own = pick(rng, ["left", "right"] if sideways else ["top", "top", "bottom"])
-    limit = np.deg2rad(rng.uniform(40.0, 178.0) if sideways else rng.uniform(20.0, 75.0))
-    ajar = rng.uniform(0.1, 0.6) if rng.random() < 0.25 else 0.0
-    fixed = int(rng.integers(count)) if count > 1 and not meeting and rng.random() < 0.35 else -1
+    sideways = draws.chance("hinged_at_side", 0.65) or meeting
+    own = draws.pick("hinge", ["left", "right"] if sideways else ["top", "top", "bottom"])
+    limit = np.deg2rad(draws.degrees("sash_angle", (40.0, 178.0) if sideways else (20.0, 75.0)))
+    ajar = draws.number("open_share", (0.1, 0.6)) if draws.chance("ajar", 0.25) else 0.0
+    one_fixed = count > 1 and not meeting and draws.chance("one_fixed", 0.35)
+    fixed = draws.integer("fixed_light", 0, count - 1) if one_fixed else -1
     leaves = []
-    lever_turns = rng.random() < 0.7
+    lever_turns = draws.chance("handle", 0.7)
     for k in range(count):
         first = edges[k] + (mullion / 2 if k > 0 and not meeting else 0.0)
         last = edges[k + 1] - (mullion / 2 if k < count - 1 and not meeting else 0.0)
         if k < count - 1 and not meeting:
             window.body += box((x0, depth / 2), about(edges[k + 1], mullion / 2), (-0.001, top + 0.001))
         if k == fixed:
-            low, high = (
-                np.array([x0 + 0.01, first - 0.001, -0.001]),
-                np.array([x0 + 0.01 + style.thick, last + 0.001, top + 0.001]),
-            )
-            window.body += style.sash(low, high)
+            low, high = (x0 + 0.01, first - 0.001, -0.001), (x0 + 0.01 + style.thick, last + 0.001, top + 0.001)
+            window.body += style.sash(np.array(low), np.array(high))
             continue
         hinge = {0: "right", count - 1: "left"}.get(k, own) if sideways and count > 1 else own
         low, high = np.array([x0, first + GAP, GAP]), np.array([x0 + style.thick, last - GAP, top - GAP])
@@ -150,10 +150,12 @@ def _leaf(
     window.add(name.replace("sash", "handle"), lever, joint, label="handle", density=2500.0)
 
 
-def _sliding(rng: Rng, window: Assembly, width: float, height: float, depth: float, style: _Style, count: int) -> None:
+def _sliding(
+    draws: Draws, window: Assembly, width: float, height: float, depth: float, style: _Style, count: int
+) -> None:
     """Sashes on as many tracks; each may slide over all others."""
     rail, pitch = style.rail, width / count
-    order = rng.permutation(count)
+    order = draws.rng.permutation(count)
     for k in range(count):
         x = -depth / 2 + 0.006 + order[k] * (style.thick + GAP)
         overlap = rail / 2
@@ -162,19 +164,18 @@ def _sliding(rng: Rng, window: Assembly, width: float, height: float, depth: flo
         low, high = np.array([x, first, GAP]), np.array([x + style.thick, last, height - GAP])
         solid = style.sash(low, high)
         y = first + rail / 2 if k == 0 else last - rail / 2
-        solid += box((x - 0.0018, x + 0.002), (y - 0.3 * rail, y + 0.3 * rail), (0.4 * height, 0.4 * height + 0.14))
-        left = last - width / 2 + GAP  # travel to both sides, towards +Y and -Y
-        joint = prismatic(
-            "frame", (0, 1, 0), min(0.0, -(first + width / 2 - GAP)), max(0.0, -left), tuple(0.5 * (low + high))
-        )
+        pull = box((x - 0.0018, x + 0.002), about(y, 0.3 * rail), (0.4 * height, 0.4 * height + 0.14))
+        solid += pull.called("handle", FRONT)
+        right, left = first + width / 2 - GAP, width / 2 - last - GAP  # travel to either side
+        joint = prismatic("frame", SIDE, min(0.0, -right), max(0.0, left), tuple(0.5 * (low + high)))
         window.add(f"sash_{k}", solid, joint, density=900.0)
 
 
-def _hung(rng: Rng, window: Assembly, width: float, height: float, depth: float, style: _Style) -> None:
+def _hung(draws: Draws, window: Assembly, width: float, height: float, depth: float, style: _Style) -> None:
     """A lower sash in front that slides up, and an upper one behind it that slides down or is fixed."""
     rail = style.rail
-    both = rng.random() < 0.6
-    meet = height * rng.uniform(0.45, 0.55)
+    both = draws.chance("both_slide", 0.6)
+    meet = height * draws.number("meeting_rail", (0.45, 0.55))
     solids = []
     for track, (first, last) in enumerate(((GAP, meet + rail / 2), (meet - rail / 2, height - GAP))):
         x = -depth / 2 + 0.006 + track * (style.thick + GAP)
@@ -188,7 +189,7 @@ def _hung(rng: Rng, window: Assembly, width: float, height: float, depth: float,
     if not both:
         stop = (-depth / 2 + 0.006 + style.thick + 2 * GAP, depth / 2 - 0.002), (-width / 2 - 0.001, -width / 2 + 0.01)
         window.body += solids[1][0] + box(*stop, (meet, height + 0.001))
-    up = prismatic("frame", (0, 0, 1), 0.0, height - meet - rail / 2 - GAP, solids[0][1])
+    up = prismatic("frame", UP, 0.0, height - meet - rail / 2 - GAP, solids[0][1])
     window.add("sash_0" if both else "sash", solids[0][0], up, density=900.0)
     if both:
         down = prismatic("frame", (0, 0, -1), 0.0, meet - rail / 2 - GAP, solids[1][1])
