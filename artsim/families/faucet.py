@@ -5,23 +5,18 @@ spout (gooseneck, bow, straight tube, flat bar), one or two handles (levers, pad
 turn and lean, the body and its feet.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
 from artsim.common.elementary import arcsin, cos, sin
 from artsim.common.products import unit
 from artsim.making.assembly import Assembly, revolute, screw, swivel
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, SIDE, UP, turns
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, rod, tube, union
+from artsim.making.outlines import FRONT, SIDE, UP, circle, turns
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.001
 BRASS = 3000.0  # kg/m^3, as the pieces are solid and real ones are hollow
-
-Handle = Callable[[Array, Array, Array], Solid]
-"""A handle by its pivot, its axis and where its lever points: drawn once, it may stand in several places."""
 
 
 def build(draws: Draws) -> Assembly:
@@ -73,7 +68,7 @@ def _basin_mixer(draws: Draws) -> Assembly:
     handle = _handle(draws, hub, draws.length("handle_length", (0.05, 0.12)), True)
     mixes = draws.chance("handle_turns_both_ways", 0.7) and lean <= 0
     low, high = (-0.5 * np.pi, 0.5 * np.pi) if mixes else (0.0, draws.angle("handle_travel", (0.8, 1.9)))
-    tap.add("handle", handle(pivot, axis, start), revolute("base", axis, pivot, low, high))
+    tap.add("handle", _placed(handle, pivot, axis, start), revolute("base", axis, pivot, low, high))
     return tap
 
 
@@ -102,7 +97,7 @@ def _kitchen_mixer(draws: Draws) -> Assembly:
     travel = draws.angle("handle_travel", (0.8, 1.57))
     axis = -out * side if upright else out * side  # towards the user, or up
     joint = revolute("base", axis, pivot, 0.0, travel)
-    tap.add("handle", handle(pivot, out, UP if upright else FRONT), joint)
+    tap.add("handle", _placed(handle, pivot, out, UP if upright else FRONT), joint)
     return tap
 
 
@@ -132,7 +127,7 @@ def _three_piece(draws: Draws) -> Assembly:
     for number, side in enumerate((-1.0, 1.0)):
         pivot = np.array([0.0, side * spread, height])
         turn = -side if outward else side
-        solid = handle(pivot, UP, side * SIDE if outward else FRONT)
+        solid = _placed(handle, pivot, UP, side * SIDE if outward else FRONT)
         tap.add(f"handle_{number}", solid, revolute("base", turn * UP, pivot, 0.0, 1.57))
     return tap
 
@@ -153,7 +148,7 @@ def _pillar_tap(draws: Draws) -> Assembly:
     pivot = np.array([0.0, 0.0, height + 0.02])
     knob = _knob(draws, radius * draws.number("knob_radius", (1.2, 1.7)))
     travel = draws.number("handle_turns", (0.5, 2.5)) * 2.0 * np.pi
-    tap.add("handle", knob(pivot, UP, FRONT), screw("base", UP, pivot, 0.0, travel, 0.0005))
+    tap.add("handle", _placed(knob, pivot, UP, FRONT), screw("base", UP, pivot, 0.0, travel, 0.0005))
     return tap
 
 
@@ -184,7 +179,7 @@ def _wall_tap(draws: Draws) -> Assembly:
     turn = min(draws.angle("handle_travel", (1.57, 3.0), (0.8, 3.4), tails=0.4), np.pi)
     for number, side in enumerate((-1.0, 1.0)):
         pivot, out = np.array([0.0, side * half, 0.0]), np.array([0.0, side, 0.0])
-        tap.add(f"handle_{number}", knob(pivot, out, FRONT), revolute("base", out, pivot, 0.0, turn))
+        tap.add(f"handle_{number}", _placed(knob, pivot, out, FRONT), revolute("base", out, pivot, 0.0, turn))
     return tap
 
 
@@ -206,9 +201,9 @@ def _body(draws: Draws, radius: float, height: float) -> Solid:
     return solid
 
 
-def _add_spout(draws: Draws, tap: Assembly, spout: Solid, z: float, turns: float, freely: float) -> None:
+def _add_spout(draws: Draws, tap: Assembly, spout: Solid, z: float, share: float, freely: float) -> None:
     """A spout that by chance turns on its foot at a height, and then by chance without end."""
-    if draws.chance("spout_turns", turns):
+    if draws.chance("spout_turns", share):
         limit = None if draws.chance("spout_turns_freely", freely) else draws.angle("spout_angle", (0.9, 2.6))
         tap.add("spout", spout, swivel("base", UP, (0, 0, z), limit))
     else:
@@ -244,79 +239,62 @@ def _nozzle(draws: Draws, start: Array, direction: Array, radius: float, length:
     return cylinder(start, start + length * unit(direction), wide, sections=18)
 
 
-def _handle(draws: Draws, radius: float, length: float, crowned: bool) -> Handle:
-    """A handle on a hub: a lever, a paddle, or a knob.
+def _placed(handle: Solid, pivot: Array, axis: Array, start: Array) -> Solid:
+    """An upright handle, whose lever points to the front, moved to its pivot and turned to an axis and a direction."""
+    return handle.rotated(np.column_stack([-start, np.cross(start, axis), axis])).moved(pivot)
+
+
+def _handle(draws: Draws, radius: float, length: float, crowned: bool) -> Solid:
+    """A handle on a hub at the origin: a lever, a paddle, or a knob.
 
     ``length`` is that from the axis to the lever's end. A hub that crowns a body is never a cross.
     """
     kind = draws.pick("handle", {"rod": 0.4, "paddle": 0.35, "ball": 0.12, "knob": 0.13})
     if kind == "knob" and not crowned:
         return _knob(draws, min(1.5 * radius, 0.4 * length))
-    tall = radius * draws.number("hub_height", (0.9, 1.7))
-    taper = draws.number("hub_taper", (0.85, 1.0))
-    domed = draws.chance("hub_domed", 0.5)
+    tall, taper = radius * draws.number("hub_height", (0.9, 1.7)), draws.number("hub_taper", (0.85, 1.0))
+    if draws.chance("hub_domed", 0.5):
+        hub = rod(0, 0, (GAP, GAP + 0.75 * tall), radius) + _dome(GAP + 0.75 * tall, radius)
+    else:
+        hub = rod(0, 0, (GAP, GAP + tall), radius, radius * taper)
     lean = draws.angle("lever_rise", (0.0, 0.45))
+    root = (GAP + 0.65 * tall) * UP
+    tip = root + length * (cos(lean) * FRONT + sin(lean) * UP)
     r = max(radius * draws.number("lever_radius", (0.18, 0.3)), 0.003)
     if kind == "paddle":
         wide = radius * draws.number("paddle_width", (0.45, 0.9))
         thick = max(radius * draws.number("paddle_thickness", (0.12, 0.22)), 0.002)
-        bulge = draws.number("paddle_bulge", (0.0, 1.0))
+        middle = 0.5 * (root + tip) + draws.number("paddle_bulge", (0.0, 1.0)) * 0.1 * length * UP
         narrow = wide * draws.number("paddle_tip_width", (0.5, 1.0))
-    else:
-        end = r * draws.number("lever_taper", (0.8, 1.2))
-
-    def shape(pivot: Array, axis: Array, start: Array) -> Solid:
-        foot = pivot + GAP * axis
-        if domed:
-            hub = cylinder(foot, foot + 0.75 * tall * axis, radius) + _dome(foot + 0.75 * tall * axis, axis, radius)
-        else:
-            hub = cylinder(foot, foot + tall * axis, radius, radius * taper)
-        root = foot + 0.65 * tall * axis
-        tip = root + length * (cos(lean) * start + sin(lean) * axis)
-        if kind == "ball":
-            return hub + tube([root, tip], 0.7 * r, 12) + ellipsoid(tip, 1.6 * r, 14)
-        if kind != "paddle":
-            return hub + tube([root, tip], [r, end], 12) + ellipsoid(tip, r, 12)
-        middle = 0.5 * (root + tip) + bulge * (0.1 * length * axis)
-        across = np.cross(axis, start)
         slabs = [
-            hull_of(*(ellipsoid(p + s * (w - thick) * across, thick, 8) for s in (-1, 1)))
+            hull_of(*(ellipsoid(p + s * (w - thick) * SIDE, thick, 8) for s in (-1, 1)))
             for p, w in ((root, wide), (middle, wide), (tip, narrow))
         ]
         return hub + hull_of(slabs[0], slabs[1]) + hull_of(slabs[1], slabs[2])
+    end = r * draws.number("lever_taper", (0.8, 1.2))
+    if kind == "ball":
+        return hub + tube([root, tip], 0.7 * r, 12) + ellipsoid(tip, 1.6 * r, 14)
+    return hub + tube([root, tip], [r, end], 12) + ellipsoid(tip, r, 12)
 
-    return shape
 
-
-def _dome(center: Array, axis: Array, radius: float) -> Solid:
+def _dome(z: float, radius: float) -> Solid:
     """A low round cap."""
-    levels = [(0.0, 1.0), (0.2, 0.9), (0.36, 0.6), (0.4, 0.3)]
-    return hull_of(*(cylinder(center - 0.01 * radius * axis, center + (h * radius + 1e-5) * axis, s * radius)
-                     for h, s in levels))  # fmt: skip
+    levels = [(-0.01, 1.0), (0.0, 1.0), (0.2, 0.9), (0.36, 0.6), (0.4, 0.3)]
+    return hull(np.concatenate([circle((0, 0, z + h * radius), UP, s * radius) for h, s in levels]))
 
 
-def _knob(draws: Draws, radius: float) -> Handle:
-    """A cross or a round knob to turn with the whole hand."""
+def _knob(draws: Draws, radius: float) -> Solid:
+    """A cross or a round knob at the origin, to turn with the whole hand."""
     tall = radius * draws.number("knob_height", (0.6, 0.9))
-    crossed = draws.chance("knob_crossed", 0.55)
-    count = draws.integer("knob_arms", 3, 5) if crossed else draws.integer("knob_ribs", 6, 11)
-    r = radius * (draws.number("knob_arm_radius", (0.14, 0.2)) if crossed else 0.14)
-
-    def shape(pivot: Array, axis: Array, _: Array) -> Solid:
-        foot = pivot + GAP * axis
-        u = np.eye(3)[np.argmin(np.abs(axis))]
-        v = np.cross(axis, u)
-        outs = [cos(a) * u + sin(a) * v for a in turns(count)]
-        if crossed:
-            center = foot + 0.55 * tall * axis
-            arms = [(center, center + radius * out) for out in outs]
-            solid = cylinder(foot, foot + tall * axis, 0.45 * radius, 0.35 * radius, 18)
-            return solid + union(tube(arm, r, 10) + ellipsoid(arm[1], 1.35 * r, 10) for arm in arms)
-        solid = cylinder(foot, foot + tall * axis, radius, 0.85 * radius)
-        solid += _dome(foot + tall * axis, axis, 0.7 * radius)
-        return solid + union(
-            cylinder(foot + 0.1 * tall * axis + s, foot + 0.85 * tall * axis + 0.9 * s, r, sections=8)
-            for s in (0.93 * radius * out for out in outs)
-        )
-
-    return shape
+    if draws.chance("knob_crossed", 0.55):
+        center = (0, 0, GAP + 0.55 * tall)
+        arms = [(radius * cos(a), radius * sin(a), center[2]) for a in turns(draws.integer("knob_arms", 3, 5))]
+        r = radius * draws.number("knob_arm_radius", (0.14, 0.2))
+        solid = rod(0, 0, (GAP, GAP + tall), 0.45 * radius, 0.35 * radius, 18)
+        return solid + union(tube([center, tip], r, 10) + ellipsoid(tip, 1.35 * r, 10) for tip in arms)
+    solid = rod(0, 0, (GAP, GAP + tall), radius, 0.85 * radius) + _dome(GAP + tall, 0.7 * radius)
+    for a in turns(draws.integer("knob_ribs", 6, 11)):
+        x, y = 0.93 * radius * cos(a), 0.93 * radius * sin(a)
+        ends = (x, y, GAP + 0.1 * tall), (0.9 * x, 0.9 * y, GAP + 0.85 * tall)
+        solid += cylinder(*ends, 0.14 * radius, sections=8)
+    return solid
