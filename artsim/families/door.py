@@ -5,7 +5,7 @@ Sizes, panels, the frame's shape (with fanlight, side light, round arch or a wal
 door stands), the thickness of the wall, handles and how far the leaf opens vary.
 """
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -13,8 +13,8 @@ from artsim.common.elementary import cos, sin
 from artsim.families.details import bar_handle, grid_panel, swing_limits
 from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT
-from artsim.making.solids import Solid, box, ellipsoid, frame, hull, ring, rod, tube, union
+from artsim.making.outlines import FRONT, about
+from artsim.making.solids import Solid, box, deferred, ellipsoid, frame, hull, ring, rod, tube, union
 from artsim.model.kinematics import Array
 
 GAP = 0.004
@@ -40,6 +40,7 @@ class Style:
         self.raised = look == "panels" and draws.chance("panels_raised", 0.6)
         handles = {"lever": 0.42, "knob": 0.3, "pull": 0.13, "none": 0.15}
         self.handle = "pull" if kind == "sliding" else draws.pick("handle", handles)
+        self.limit = 0.0  # radians that a hinged leaf opens
         self.handle_z = draws.length("handle_height", (0.95, 1.1))
 
 
@@ -58,8 +59,8 @@ def build(draws: Draws) -> Assembly:
     if kind == "sliding":
         _sliding(draws, door, width, height, depth, style)
         return door
-    limit = float(np.deg2rad(draws.degrees("opening_angle", (60.0, 175.0))))
-    ajar = draws.number("open_share", (0.1, 0.75)) * limit if draws.chance("ajar", 0.25) else 0.0
+    style.limit = float(np.deg2rad(draws.degrees("opening_angle", (60.0, 175.0))))
+    ajar = draws.number("open_share", (0.1, 0.75)) * style.limit if draws.chance("ajar", 0.25) else 0.0
     both = draws.chance("handles_on_both", 0.5)
     sides = [draws.side("hinge")] if kind == "single" else [1.0, -1.0]
     for number, side in enumerate(sides):
@@ -69,7 +70,7 @@ def build(draws: Draws) -> Assembly:
         high = np.array([-depth / 2 + style.thickness, max(edge, inner), height - 0.005])
         name = "door" if kind == "single" else f"door_{number}"
         turning = style.handle in ("lever", "knob") and (number == 0 or both)
-        _leaf(draws, door, name, side, low, high, style, limit, turning)
+        _leaf(draws, door, name, side, low, high, style, turning)
         if ajar > 0 and number == 0:
             door.open_at_rest(name, ajar)
     return door
@@ -145,57 +146,32 @@ def _frame(draws: Draws, width: float, height: float, depth: float, jamb: float,
     return solid
 
 
+@deferred
 def _face(low: Array, high: Array, style: Style, bore: tuple[float, float, float] | None) -> Solid:
+    """A leaf without its handle; boards may rise in their middle, on both sides."""
     width, height = high[1] - low[1], high[2] - low[2]
     stile = min(style.stile, 0.22 * width)
-    columns = list(np.linspace(low[1] + stile / 2, high[1] - stile / 2, style.columns + 1)[1:-1])
+    columns = np.linspace(low[1] + stile / 2, high[1] - stile / 2, style.columns + 1)[1:-1]
     rows = [low[2] + share * height for share in style.rows]
     bar = 0.8 * stile if style.board > 0.008 else 0.35 * stile
-    solid = grid_panel(
-        low, high, [stile, stile, 1.6 * stile, stile], columns, rows, bar, style.board, bore, style.glass
-    )
-    if style.raised:
-        solid += union(_raised(low, high, cell, style) for cell in _cells(low, high, columns, rows, stile, bar))
+    widths = [stile, stile, 1.6 * stile, stile]
+    solid = grid_panel(low, high, widths, columns, rows, bar, style.board, bore, style.glass)
+    if not style.raised:
+        return solid
+    middle, margin = 0.5 * (low[0] + high[0]), 0.03
+    levels = ((style.board / 2 - 0.001, margin), (0.42 * style.thickness, 1.7 * margin))
+    edges_y = [low[1] + stile - bar / 2, *columns, high[1] - stile + bar / 2]
+    edges_z = [low[2] + 1.6 * stile - bar / 2, *rows, high[2] - stile + bar / 2]
+    for y, z in product(pairwise(edges_y), pairwise(edges_z)):
+        cell = np.array([y, z]) + (bar / 2, -bar / 2)
+        if (cell[:, 1] - cell[:, 0]).min() >= 3.5 * margin:
+            solid += hull([(middle + s * out, *spot) for s in (-1, 1) for out, inset in levels
+                           for spot in product(*(cell + (inset, -inset)))])  # fmt: skip
     return solid
 
 
-def _cells(low: Array, high: Array, columns: list[float], rows: list[float], stile: float, bar: float) -> list[Array]:
-    """(2, 2) corners in Y and Z of the boards between the bars."""
-    edges_y = [low[1] + stile - bar / 2, *columns, high[1] - stile + bar / 2]
-    edges_z = [low[2] + 1.6 * stile - bar / 2, *rows, high[2] - stile + bar / 2]
-    cells = []
-    for y0, y1 in pairwise(edges_y):
-        for z0, z1 in pairwise(edges_z):
-            cells.append(np.array([(y0 + bar / 2, z0 + bar / 2), (y1 - bar / 2, z1 - bar / 2)]))
-    return cells
-
-
-def _raised(low: Array, high: Array, cell: Array, style: Style) -> Solid:
-    """A field that rises from its board on both sides."""
-    middle = 0.5 * (low[0] + high[0])
-    margin = 0.03
-    if (cell[1] - cell[0]).min() < 3.5 * margin:
-        return Solid()
-    points = [
-        (middle + s * out, y, z)
-        for s in (-1, 1)
-        for out, inset in ((style.board / 2 - 0.001, margin), (0.42 * style.thickness, 1.7 * margin))
-        for y in (cell[0, 0] + inset, cell[1, 0] - inset)
-        for z in (cell[0, 1] + inset, cell[1, 1] - inset)
-    ]
-    return hull(points)
-
-
 def _leaf(
-    draws: Draws,
-    door: Assembly,
-    name: str,
-    side: float,
-    low: Array,
-    high: Array,
-    style: Style,
-    limit: float,
-    turning: bool,
+    draws: Draws, door: Assembly, name: str, side: float, low: Array, high: Array, style: Style, turning: bool
 ) -> None:
     """A leaf hinged at ``side`` (1: left, as one stands before it), with its handle at the other edge."""
     edge = high[1] if side > 0 else low[1]
@@ -203,7 +179,11 @@ def _leaf(
     stile = min(style.stile, 0.22 * width)
     # A knob nearer to the edge would strike the jamb as it swings out.
     y, z = edge - side * (width - max(stile / 2, 0.055)), style.handle_z
-    leaf = _face(low, high, style, (y, z, 0.0105) if turning else None) + _knuckles(low, high, edge, side)
+    leaf = _face(low, high, style, (y, z, 0.0105) if turning else None)
+    for share in (0.12, 0.5, 0.88):  # knuckles beside the hinge's axis
+        at = (low[0] - PROUD + 0.006, edge - side * 0.007, low[2] + share * (high[2] - low[2]))
+        leaf += rod(at[0], at[1], about(at[2], 0.045), 0.0055, sections=12)
+        leaf += box((at[0], low[0] + 0.001), about(at[1], 0.003), about(at[2], 0.045))
     reach = 0.0
     if turning:
         leaf += _escutcheon(draws, low, high, y, z, stile)
@@ -212,22 +192,13 @@ def _leaf(
         half, reach = 0.5 * draws.length("pull_length", (0.2, 0.8)), 0.07
         for x, outward in ((low[0], FRONT), (high[0], -FRONT)):
             leaf += bar_handle((x, y, z - half), (x, y, z + half), outward, 0.055, 0.011)
-    _, most = swing_limits(width - stile, reach - PROUD)
+    most = min(style.limit, swing_limits(width - stile, reach - PROUD)[1])
     hinge = (low[0] - PROUD, edge, 0.5 * (low[2] + high[2]))
-    door.add(name, leaf, revolute("frame", (0, 0, -side), hinge, 0.0, min(limit, most)), label="door", density=500.0)
+    door.add(name, leaf, revolute("frame", (0, 0, -side), hinge, 0.0, most), label="door", density=500.0)
     if turning:
-        _turning_handle(draws, door, name, style.handle, low[0], high[0], (y, z), side)
-
-
-def _knuckles(low: Array, high: Array, edge: float, side: float) -> Solid:
-    """Hinges beside the axis."""
-    x, y = low[0] - PROUD + 0.006, edge - side * 0.007
-    solid = Solid()
-    for share in (0.12, 0.5, 0.88):
-        z = low[2] + share * (high[2] - low[2])
-        solid += rod(x, y, (z - 0.045, z + 0.045), 0.0055, sections=12)
-        solid += box((x, low[0] + 0.001), (y - 0.003, y + 0.003), (z - 0.045, z + 0.045))
-    return solid
+        handle, lower, upper = _turning_handle(draws, style, low[0], high[0], y, side)
+        joint = revolute(name, (-side, 0, 0), (low[0], y, z), lower, upper)
+        door.add(name.replace("door", "handle"), handle, joint, label="handle", density=2500.0)
 
 
 def _escutcheon(draws: Draws, low: Array, high: Array, y: float, z: float, stile: float) -> Solid:
@@ -244,30 +215,19 @@ def _escutcheon(draws: Draws, low: Array, high: Array, y: float, z: float, stile
 
 
 def _turning_handle(
-    draws: Draws,
-    door: Assembly,
-    leaf: str,
-    kind: str,
-    front: float,
-    back: float,
-    center: tuple[float, float],
-    side: float,
-) -> None:
-    """Lever or knob on both sides of a leaf, on one spindle through it."""
-    y, z = center
-    out = 0.045
+    draws: Draws, style: Style, front: float, back: float, y: float, side: float
+) -> tuple[Solid, float, float]:
+    """Lever or knob on both sides of a leaf, on one spindle through it; and how far it turns."""
+    z, out = style.handle_z, 0.045
     handle = rod((front - out, back + out), y, z, 0.0085, sections=12)
-    if kind == "knob":
+    if style.handle == "knob":
         width, tall = draws.length("knob_width", (0.024, 0.032)), draws.length("knob_height", (0.02, 0.032))
         handle += union(ellipsoid((x, y, z), (0.02, width, tall)) for x in (front - out - 0.01, back + out + 0.01))
-        lower, upper = -1.3, 1.3
-    else:
-        length, droop = draws.length("lever_length", (0.09, 0.13)), draws.length("lever_rise", (-0.012, 0.012))
-        radius = draws.length("lever_radius", (0.007, 0.01))
-        for x, turn in ((front - out, 1.0), (back + out, -1.0)):
-            path = [(x, y - 0.4 * side * radius, z), (x, y + 0.6 * side * length, z + droop),
-                    (x + turn * 0.01, y + side * length, z + droop)]  # fmt: skip
-            handle += tube(path, radius, 10)
-        lower, upper = 0.0, float(np.deg2rad(draws.degrees("lever_angle", (30.0, 50.0))))
-    name = "handle" if leaf == "door" else leaf.replace("door", "handle")
-    door.add(name, handle, revolute(leaf, (-side, 0, 0), (front, y, z), lower, upper), label="handle", density=2500.0)
+        return handle, -1.3, 1.3
+    length, droop = draws.length("lever_length", (0.09, 0.13)), draws.length("lever_rise", (-0.012, 0.012))
+    radius = draws.length("lever_radius", (0.007, 0.01))
+    for x, turn in ((front - out, 1.0), (back + out, -1.0)):
+        path = [(x, y - 0.4 * side * radius, z), (x, y + 0.6 * side * length, z + droop),
+                (x + turn * 0.01, y + side * length, z + droop)]  # fmt: skip
+        handle += tube(path, radius, 10)
+    return handle, 0.0, float(np.deg2rad(draws.degrees("lever_angle", (30.0, 50.0))))
