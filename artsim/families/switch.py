@@ -4,22 +4,18 @@ What varies: how many, what kind, side by side or above one another, square and 
 bevels, how long toggles are.
 """
 
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
 
 from artsim.common.elementary import arctan, sin, tan
-from artsim.making.assembly import Assembly, JointSpec, revolute
+from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, SIDE
-from artsim.making.solids import Solid, box, frame, hull_of, rod, union
+from artsim.making.solids import Solid, box, deferred, frame, hull_of, rod, union
 from artsim.model.kinematics import Array
 
 GAP = 0.0007
-
-Button = Callable[[Array], tuple[Solid, JointSpec]]
-"""What moves, and its joint, by the two corners in Y and Z of its cell: drawn once, it may stand in several places."""
 
 
 def build(draws: Draws) -> Assembly:
@@ -56,16 +52,29 @@ def build(draws: Draws) -> Assembly:
     level = draws.chance("rocker_level", 0.35)  # rockers rest in the middle and tip either way
     live = draws.integer("buttons", 1, count) if draws.chance("some_fixed", 0.3) else count
     if kind == "rocker":
-        button = _rocker(alike, depth, tilt, level)
+        bulge, marked = alike.length("rocker_bulge", (0.0005, 0.0025)), alike.chance("rocker_mark", 0.5)
     elif kind == "toggle":
-        button = _toggle(alike, depth)
+        swing, bat = alike.angle("toggle_swing", (0.3, 0.5)), _toggle(alike, depth)
     else:
-        button = _dimmer(alike, depth, min(0.4 * pitch, 0.35 * height))
+        knob, turn = _dimmer(alike, depth, min(0.4 * pitch, 0.35 * height)), alike.angle("knob_travel", (3.5, 5.2))
     for cell, place in zip(cells, draws.rng.permutation(count), strict=True):
-        if kind == "toggle":
-            low, high = cell.mean(axis=0) - (0.0095, 0.013), cell.mean(axis=0) + (0.0095, 0.013)
+        center = cell.mean(axis=0)
+        if kind == "rocker":
+            pivot = (-0.8 * depth, *center)
+            solid = _rocker(cell, depth, tilt, bulge, marked)
+            lower = -tilt if level else 0.0
+            joint = revolute("frame", SIDE, pivot, lower, lower + 2 * tilt)
+            if level:
+                solid = solid.turned(SIDE, tilt, pivot)
+        elif kind == "toggle":
+            pivot = (-depth - 0.006, *center)
+            low, high = center - (0.0095, 0.013), center + (0.0095, 0.013)
             plate += frame((-depth - 0.0025, *low), (-depth + 0.001, *high), [0.002, 0.002, 0.003, 0.003])
-        solid, joint = button(cell)
+            solid = bat.moved((0, *center)).turned(SIDE, -swing, pivot)
+            joint = revolute("frame", SIDE, pivot, 0.0, 2 * swing)
+        else:
+            solid = knob.moved((0, *center))
+            joint = revolute("frame", FRONT, (-depth, *center), 0.0, turn)
         if place < live:
             switch.add_numbered("button", solid, joint)
         else:
@@ -112,63 +121,39 @@ def _plate(draws: Draws, width: float, height: float, depth: float, screws: bool
     return solid
 
 
-def _rocker(draws: Draws, depth: float, tilt: float, level: bool) -> Button:
-    """A plate bent in its middle: at rest its upper half stands out, and tips in when pressed; or it rests level."""
+@deferred
+def _rocker(cell: Array, depth: float, tilt: float, bulge: float, marked: bool) -> Solid:
+    """A plate bent in its middle: at rest its upper half stands out, and tips in when pressed."""
     x, thick = -0.8 * depth, min(0.3 * depth, 0.004)
-    proud = draws.length("rocker_bulge", (0.0005, 0.0025))
-    marked = draws.chance("rocker_mark", 0.5)
-
-    def shape(cell: Array) -> tuple[Solid, JointSpec]:
-        pivot = (x, *cell.mean(axis=0))
-        half_y, half_z = 0.5 * (cell[1] - cell[0]) - GAP
-        half_z = half_z - (thick + proud) * sin(2 * tilt) - 0.0003
-        ridge = box((x - thick, x + 0.3 * thick), half_y, 0.001, fillet=0.0008)
-        solid = Solid()
-        for side in (-1.0, 1.0):
-            # Bent outward by the tilt: either half stands flush when the switch is tipped its way.
-            end = box((x - thick - proud, x + 0.2 * thick), half_y, 0.0015, fillet=0.001)
-            solid += hull_of(ridge, end.moved((-0.5 * half_z * tan(tilt), 0, side * (half_z - 0.0015))))
-        if marked:
-            z, front = 0.7 * half_z, x - thick - proud - 0.45 * half_z * tan(tilt)
-            solid += box((front - 0.0006, x), 0.1 * half_y, (z - 0.12 * half_z, z))
-        solid = solid.moved((0, *pivot[1:])).turned(SIDE, -tilt, pivot)
-        lower = -tilt if level else 0.0
-        return solid.turned(SIDE, tilt, pivot) if level else solid, revolute(
-            "frame", SIDE, pivot, lower, lower + 2 * tilt
-        )
-
-    return shape
+    pivot = (x, *cell.mean(axis=0))
+    half_y, half_z = 0.5 * (cell[1] - cell[0]) - GAP
+    half_z = half_z - (thick + bulge) * sin(2 * tilt) - 0.0003
+    ridge = box((x - thick, x + 0.3 * thick), half_y, 0.001, fillet=0.0008)
+    solid = Solid()
+    for side in (-1.0, 1.0):
+        # Bent outward by the tilt: either half stands flush when the switch is tipped its way.
+        end = box((x - thick - bulge, x + 0.2 * thick), half_y, 0.0015, fillet=0.001)
+        solid += hull_of(ridge, end.moved((-0.5 * half_z * tan(tilt), 0, side * (half_z - 0.0015))))
+    if marked:
+        z, front = 0.7 * half_z, x - thick - bulge - 0.45 * half_z * tan(tilt)
+        solid += box((front - 0.0006, x), 0.1 * half_y, (z - 0.12 * half_z, z))
+    return solid.moved((0, *pivot[1:])).turned(SIDE, -tilt, pivot)
 
 
-def _toggle(draws: Draws, depth: float) -> Button:
-    """A bat on a round hub."""
+def _toggle(draws: Draws, depth: float) -> Solid:
+    """A bat on a round hub, straight out."""
     x = -depth - 0.006
-    swing = draws.angle("toggle_swing", (0.3, 0.5))
     wide = 0.5 * draws.length("toggle_width", (0.007, 0.012))
     length = draws.length("toggle_length", (0.012, 0.02), (0.007, 0.028), tails=0.3)
-    tip_half = 0.5 * draws.length("toggle_tip", (0.006, 0.0086))
     root = box((x - 0.003, x), wide, 0.003, fillet=0.001)
+    tip_half = 0.5 * draws.length("toggle_tip", (0.006, 0.0086))
     tip = box((x - length, x - length + 0.004), wide * 1.1, tip_half, fillet=0.0015)
-    bat = rod(x, (-wide, wide), 0, 0.0045, sections=18) + hull_of(root, tip)
-
-    def shape(cell: Array) -> tuple[Solid, JointSpec]:
-        pivot = (x, *cell.mean(axis=0))
-        solid = bat.moved((0, *pivot[1:])).turned(SIDE, -swing, pivot)
-        return solid, revolute("frame", SIDE, pivot, 0.0, 2 * swing)
-
-    return shape
+    return rod(x, (-wide, wide), 0, 0.0045, sections=18) + hull_of(root, tip)
 
 
-def _dimmer(draws: Draws, depth: float, radius: float) -> Button:
+def _dimmer(draws: Draws, depth: float, radius: float) -> Solid:
     """A round knob with a pointer."""
     r, tall = min(radius, draws.length("knob_radius", (0.012, 0.02))), draws.length("knob_height", (0.009, 0.016))
     x = -depth - GAP
-    knob = rod((x, x - tall), 0, 0, r, draws.number("knob_taper", (0.8, 0.98)) * r, 32)
-    knob += box((x - tall - 0.0008, x - 0.5 * tall), 0.0012, (0.2 * r, 0.75 * r))
-    travel = draws.angle("knob_travel", (3.5, 5.2))
-
-    def shape(cell: Array) -> tuple[Solid, JointSpec]:
-        center = cell.mean(axis=0)
-        return knob.moved((0, *center)), revolute("frame", FRONT, (-depth, *center), 0.0, travel)
-
-    return shape
+    solid = rod((x, x - tall), 0, 0, r, draws.number("knob_taper", (0.8, 0.98)) * r, 32)
+    return solid + box((x - tall - 0.0008, x - 0.5 * tall), 0.0012, (0.2 * r, 0.75 * r))
