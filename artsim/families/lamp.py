@@ -16,7 +16,7 @@ from artsim.families.standing_lamp import spotlight, standing
 from artsim.making.assembly import Assembly, continuous, revolute
 from artsim.making.draws import Draws
 from artsim.making.outlines import SIDE, UP
-from artsim.making.solids import box, cylinder, ellipsoid, hull_of, revolved, rod, tube, union
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, revolved, rod, tube, union
 from artsim.model.kinematics import Array
 from artsim.model.transforms import rotation_about
 
@@ -32,19 +32,23 @@ def build(draws: Draws) -> Assembly:
 def _desk(draws: Draws) -> Assembly:
     """Base, arms and shade."""
     for again in draws.tries():
-        links, half, r, foot = _links(again)
+        links, beside, foot = _links(again)
         if narrow_limits(links, 0.02):
             break
     lamp = Assembly(density=1200.0)
     for link in links:
         lamp.add(link.name, link.solid, link.joint)
-    if foot is not None:
-        _parallel_rod(lamp, links, foot, half, r)
+    if foot is not None:  # the rod follows the lower arm
+        k = [link.name for link in links].index("lower_arm")
+        arm = links[k].joint
+        assert arm is not None
+        joint = revolute(links[k - 1].name, SIDE, foot, arm.lower, arm.upper, mimic=("lower_arm", 1.0))
+        lamp.add("rod", beside, joint)
     return lamp
 
 
-def _links(draws: Draws) -> tuple[list[Link], float, float, Array | None]:
-    """All links, half width and radius of their knuckles, and the foot of the parallel rod, if there is one."""
+def _links(draws: Draws) -> tuple[list[Link], Solid, Array | None]:
+    """All links; and the rod that runs beside the lower arm, and its foot, if there is one."""
     half, r = draws.length("arm_radius", (0.006, 0.009)), draws.length("knuckle_radius", (0.010, 0.015))
     links = [Link("base")]
     top = _base(draws, links[0], r)
@@ -61,7 +65,7 @@ def _links(draws: Draws) -> tuple[list[Link], float, float, Array | None]:
     leans = {"lower_arm": (5.0, 40.0), "second_arm": (-100.0, -55.0), "third_arm": (-30.0, 40.0)}
     angles = np.deg2rad([draws.degrees(f"{arm}_angle", usual) for arm, usual in leans.items()])  # from the link before
     angle, side = 0.0, draws.side("arms_side")
-    foot = None
+    beside, foot = Solid(), None
     if draws.chance("rod", 0.35):  # a lug behind the knuckle carries the parallel rod
         foot = at + (2.4 * r, 0, 0)
         ends = [cylinder(p - half * SIDE, p + half * SIDE, q, sections=16) for p, q in ((at, r), (foot, 0.7 * r))]
@@ -82,11 +86,16 @@ def _links(draws: Draws) -> tuple[list[Link], float, float, Array | None]:
         if k == 0 and foot is not None:  # the rod stays within this distance
             links[-1].guard(at + 0.09 * _lean(angle), at + 0.9 * length * _lean(angle), 3.4 * r + 2.0 * half)
         at = _arm(links[-1], at, _lean(angle), length, half, r, double, sprung and k < 2)
+        if k == 0 and foot is not None:
+            start, end = links[-1].capsules[-1][:3], links[-1].capsules[-1][3:6]
+            path = [foot, foot + 0.93 * (end - start)]
+            beside += tube(path, 0.55 * half, 10)
+            beside += union(cylinder(p - half * SIDE, p + half * SIDE, 0.7 * r, sections=16) for p in path)
         if draws.chance(f"{name}_sides_change", 0.7):
             side = -side
     at = at + side * (2.0 * half + GAP) * SIDE
     _shade(draws, links, at, side, angle, half, r)
-    return links, half, r, foot
+    return links, beside, foot
 
 
 def _lean(angle: float) -> Array:
@@ -107,13 +116,11 @@ def _base(draws: Draws, link: Link, r: float) -> float:
         link.guard((-0.02, 0, -0.12), (-0.02, 0, 0.03), 0.05)
         link.guard((-0.08, 0, 0), (0.05, 0, 0), 0.03)
         thick = 0.012
-    elif kind == "square":
-        link.solid += box(wide, 0.8 * wide, (0, thick), fillet=0.25 * wide, axis=2)
     else:
-        link.solid += rod(0, 0, (0, thick), wide, 0.95 * wide, 36)
+        square = box(wide, 0.8 * wide, (0, thick), fillet=0.25 * wide, axis=2)
+        link.solid += square if kind == "square" else rod(0, 0, (0, thick), wide, 0.95 * wide, 36)
         if kind == "dome":
             link.solid += rod(0, 0, (thick - 0.001, thick + 0.015), 0.9 * wide, 0.3 * wide, 32)
-    if kind != "clamp":
         for angle in np.arange(8) * np.pi / 4.0:  # a rim of rods guards the disc
             out = np.array([cos(angle), sin(angle), 0.0])
             link.guard((0, 0, 0.5 * thick), wide * 1.1 * out + (0, 0, 0.5 * thick), 0.5 * thick)
@@ -137,10 +144,8 @@ def _arm(
         link.solid += tube([at, end], thin, 12)
     if sprung:
         low, high = at + 0.15 * length * along, at + 0.4 * length * along
-        coils = np.linspace(0.0, 1.0, 11)
-        for share in coils:
-            middle = low + share * (high - low)
-            link.solid += cylinder(middle, middle + 0.05 * (high - low), 0.97 * half, sections=12)
+        coils = (low + share * (high - low) for share in np.linspace(0.0, 1.0, 11))
+        link.solid += union(cylinder(p, p + 0.05 * (high - low), 0.97 * half, sections=12) for p in coils)
     link.solid += cylinder(end - half * SIDE, end + half * SIDE, r, sections=18)
     link.guard(at, end, r)
     return end
@@ -187,15 +192,3 @@ def _shade(draws: Draws, links: list[Link], at: Array, side: float, arm_angle: f
     hinge = at - side * (half + 0.5 * GAP) * SIDE
     links.append(Link("shade", revolute(links[-1].name, SIDE, hinge, lower, max(upper, 0.05)), solid=solid))
     links[-1].guard(*guard)
-
-
-def _parallel_rod(lamp: Assembly, links: list[Link], foot: Array, half: float, r: float) -> None:
-    """A rod beside the lower arm that follows it."""
-    k = next(k for k, link in enumerate(links) if link.name == "lower_arm")
-    joint = links[k].joint
-    assert joint is not None
-    start, end = links[k].capsules[-1][:3], links[k].capsules[-1][3:6]
-    tip = foot + 0.93 * (end - start)
-    solid = tube([foot, tip], 0.55 * half, 10)
-    solid += union(cylinder(point - half * SIDE, point + half * SIDE, 0.7 * r, sections=16) for point in (foot, tip))
-    lamp.add("rod", solid, revolute(links[k - 1].name, SIDE, foot, joint.lower, joint.upper, mimic=("lower_arm", 1.0)))
