@@ -61,7 +61,8 @@ def _head_fan(draws: Draws) -> Assembly:
     blades = _blades(draws, cage, 2.0 * abs(middle - back)).moved((middle, 0, level))
     blades += rod((middle, back - GAP), 0, level, 0.03 * cage, sections=10)
     stages.append(("blades", blades, continuous("", FRONT, (middle, 0, level))))
-    fan, below = Assembly(density=1200.0), ("base", base, None)
+    fan = Assembly(density=1200.0)
+    below: tuple[str, Solid, JointSpec | None] = ("base", base, None)
     for name, solid, joint in stages:
         if joint is None:
             below = below[0], below[1] + solid, below[2]

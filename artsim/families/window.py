@@ -101,8 +101,8 @@ def _hinged(
         if k < count - 1 and not meeting:
             window.body += box((x0, depth / 2), about(edges[k + 1], mullion / 2), (-0.001, top + 0.001))
         if k == fixed:
-            low, high = (x0 + 0.01, first - 0.001, -0.001), (x0 + 0.01 + style.thick, last + 0.001, top + 0.001)
-            window.body += style.sash(np.array(low), np.array(high))
+            low = np.array([x0 + 0.01, first - 0.001, -0.001])
+            window.body += style.sash(low, np.array([x0 + 0.01 + style.thick, last + 0.001, top + 0.001]))
             continue
         hinge = {0: "right", count - 1: "left"}.get(k, own) if sideways and count > 1 else own
         low, high = np.array([x0, first + GAP, GAP]), np.array([x0 + style.thick, last - GAP, top - GAP])
