@@ -5,15 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from artsim.common.elementary import arccos, arcsin, cos, sin
-from artsim.making.draws import Draws, Rng
-
-
-def with_tails(rng: Rng, usual: tuple[float, float], widest: tuple[float, float], share: float = 0.25) -> float:
-    """A number from the usual range, or with chance ``share`` from one of the tails up to the widest range."""
-    tails = [t for t in ((widest[0], usual[0]), (usual[1], widest[1])) if t[0] < t[1]]
-    if not tails or rng.random() >= share:
-        return float(rng.uniform(*usual))
-    return float(rng.uniform(*tails[int(rng.integers(len(tails)))]))
+from artsim.making.draws import Draws
 
 
 def unusual_sides(

@@ -125,8 +125,7 @@ class _Chain:
 
 def build(draws: Draws) -> Assembly:
     """A robot arm, stretched out or bent at rest."""
-    while True:
-        draws.again()
+    for _ in draws.tries():
         reach = draws.length("length", (0.4, 1.6))
         chain = _Chain(draws, reach)
         if draws.chance("scara", 0.17):

@@ -1,14 +1,12 @@
 """Assemblies: solids put together by joints, as the families of procedural objects describe them."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from artsim.common.products import apply, unit
 from artsim.errors import AssetError, KinematicsError
-from artsim.making.draws import Rng as Rng
 from artsim.making.outlines import Vector
 from artsim.making.solids import Solid
 from artsim.model.details import detail_of
@@ -16,14 +14,6 @@ from artsim.model.joints import Joint, Mimic
 from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import ArticulatedObject, Body, Part, content_sha256
 from artsim.model.transforms import rotation_about
-
-Choice = TypeVar("Choice")
-
-
-def pick(rng: Rng, options: Mapping[Choice, float] | Sequence[Choice]) -> Choice:
-    """One of several options, each with its chance, or all equally likely: ``pick(rng, {"bar": 0.6, "none": 0.4})``."""
-    chances = list(options.values()) if isinstance(options, Mapping) else None
-    return list(options)[int(rng.choice(len(options), p=chances))]
 
 
 @dataclass(frozen=True)

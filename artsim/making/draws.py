@@ -59,7 +59,8 @@ class _Trace:
 class Draws:
     """What a family draws from.
 
-    A name that is drawn again is numbered: ``width``, ``width_2``.
+    A name that is drawn again is numbered: ``width``, ``width_2``. What is asked of ``width`` counts for both, unless
+    it is a whole number: a count.
 
     Parameters
     ----------
@@ -71,27 +72,18 @@ class Draws:
     """
 
     def __init__(self, rng: Rng, wanted: Mapping[str, Wanted] | None = None, lenient: bool = False) -> None:
-        self._rng = rng
+        self.rng = rng
+        """The generator, for what is no parameter: an order, noise."""
         self._trace = _Trace(wanted or {}, lenient)
         self._prefix = ""
 
-    @property
-    def rng(self) -> Rng:
-        """The generator, for what is no parameter: an order, noise."""
-        return self._rng
-
     def within(self, name: str) -> Draws:
         """The same draws for a piece of the object, whose names begin with its own: ``door_width``."""
-        return self._child(self._rng, name)
+        return self._child(self.rng, name)
 
     def fork(self, name: str, seed: int | Sequence[int] | Rng) -> Draws:
         """Draws of a piece from a generator of its own, which is given or made: equal seeds make equal pieces."""
         return self._child(np.random.default_rng(seed), name)
-
-    def again(self) -> None:
-        """Forget what was drawn, for a family that draws the whole object anew: names begin at their first."""
-        self._trace.drawn.clear()
-        self._trace.counts.clear()
 
     def tries(self) -> Iterator[Draws]:
         """These draws until what is drawn fits: the draws of each try take the place of those of the one before.
@@ -109,13 +101,8 @@ class Draws:
 
     def _child(self, rng: Rng, name: str) -> Draws:
         child = Draws.__new__(Draws)
-        child._rng, child._trace, child._prefix = rng, self._trace, f"{self._prefix}{name}_" if name else self._prefix
+        child.rng, child._trace, child._prefix = rng, self._trace, f"{self._prefix}{name}_" if name else self._prefix
         return child
-
-    def __getattr__(self, name: str) -> Any:  # families that draw without names
-        if name.startswith("__"):
-            raise AttributeError(name)
-        return getattr(self._rng, name)
 
     @property
     def drawn(self) -> Mapping[str, Draw]:
@@ -134,10 +121,10 @@ class Draws:
         low, high = usual
         if widest is not None:
             beyond = [t for t in ((widest[0], low), (high, widest[1])) if t[0] < t[1]]
-            if beyond and self._rng.random() < tails:
-                low, high = beyond[int(self._rng.integers(len(beyond)))]
+            if beyond and self.rng.random() < tails:
+                low, high = beyond[int(self.rng.integers(len(beyond)))]
         least, most = widest or usual
-        return self._number(name, of * float(self._rng.uniform(low, high)), (of * least, of * most), unit)
+        return self._number(name, of * float(self.rng.uniform(low, high)), (of * least, of * most), unit)
 
     def length(
         self, name: str, usual: Interval, widest: Interval | None = None, *, tails: float = 0.25, of: float = 1.0
@@ -155,30 +142,26 @@ class Draws:
 
     def log_length(self, name: str, middle: float, low: float, high: float) -> float:
         """Metres whose logarithm is drawn evenly: from ``middle * exp(low)`` to ``middle * exp(high)``."""
-        value = middle * exp(self._rng.uniform(low, high))
+        value = middle * exp(self.rng.uniform(low, high))
         return self._number(name, value, (middle * exp(low), middle * exp(high)), "m")
 
     def numbers(self, name: str, low: Any, high: Any, count: int | None = None, *, unit: str = "") -> Array:
         """(N,) numbers between ``low`` and ``high``, each of which may be an array; named ``name``, ``name_2``."""
-        values = np.asarray(self._rng.uniform(low, high, count), dtype=np.float64)
+        values = np.asarray(self.rng.uniform(low, high, count), dtype=np.float64)
         ends = np.broadcast_to(low, values.shape), np.broadcast_to(high, values.shape)
         found = [
             self._number(name, float(v), (float(a), float(b)), unit) for v, a, b in zip(values, *ends, strict=True)
         ]
         return np.array(found)
 
-    def triangular(
-        self, name: str, low: float, mode: float, high: float = 0.0, *, unit: str = "", of: float = 1.0
-    ) -> float:
+    def triangular(self, name: str, low: float, mode: float, high: float, *, unit: str = "", of: float = 1.0) -> float:
         """A number whose density rises from ``low`` to ``mode`` and falls to ``high``: shares ``of`` a number."""
-        if not isinstance(name, str):
-            return self._rng.triangular(name, low, mode)
-        return self._number(name, of * float(self._rng.triangular(low, mode, high)), (of * low, of * high), unit)
+        return self._number(name, of * float(self.rng.triangular(low, mode, high)), (of * low, of * high), unit)
 
     def integer(self, name: str, least: int, most: int) -> int:
         """A whole number from ``least`` to ``most``, both included."""
-        value = int(self._rng.integers(least, most + 1))
-        key, wanted = self._asked(name)
+        value = int(self.rng.integers(least, most + 1))
+        key, wanted = self._asked(name, each=False)  # three doors are three doors in all
         draw = Draw(value, "integer", least, most)
         if wanted is not None:
             low, high = self._range(key, wanted, draw)
@@ -191,7 +174,7 @@ class Draws:
 
     def chance(self, name: str, share: float, *, upper: bool = False) -> bool:
         """True with the chance ``share``: a flat number from 0 to 1 is below it, or, ``upper``, above the rest."""
-        value = bool(self._rng.random() >= 1.0 - share if upper else self._rng.random() < share)
+        value = bool(self.rng.random() >= 1.0 - share if upper else self.rng.random() < share)
         key, wanted = self._asked(name)
         draw = Draw(value, "yes or no", high=share)
         asked = _yes_or_no(wanted)
@@ -206,7 +189,7 @@ class Draws:
         """One of several options, each with its chance, or all equally likely: ``{"bar": 0.6, "none": 0.4}``."""
         chances = list(options.values()) if isinstance(options, Mapping) else None
         every = list(options)
-        chosen = every[int(self._rng.choice(len(every), p=chances))]
+        chosen = every[int(self.rng.choice(len(every), p=chances))]
         key, wanted = self._asked(name)
         names = tuple(_text(option) for option in every)
         if wanted is not None and not _names(wanted, _text(chosen)):
@@ -226,19 +209,21 @@ class Draws:
 
     def seed(self, name: str) -> int:
         """A seed for :meth:`fork`."""
-        value = int(self._rng.integers(_SEEDS))
-        key, wanted = self._asked(name)
+        value = int(self.rng.integers(_SEEDS))
+        key, wanted = self._asked(name, each=False)
         return int(self._keep(key, Draw(value if wanted is None else int(wanted), "seed", 0, _SEEDS - 1)))  # type: ignore[arg-type]
 
-    def _asked(self, name: str) -> tuple[str, Wanted | None]:
-        """The draw's full name, and what is asked for."""
-        key = self._prefix + name
+    def _asked(self, name: str, each: bool = True) -> tuple[str, Wanted | None]:
+        """The draw's full name, and what is asked for: by this name, or, ``each``, by the name without its number."""
+        first = key = self._prefix + name
         count = self._trace.counts.get(key, 0) + 1
         self._trace.counts[key] = count
         if count > 1:
             key = f"{key}_{count}"
-        wanted = self._trace.wanted
-        return key, wanted.get(key, wanted.get(key_of(key))) if wanted else None
+        for asked in (key, key_of(key), *((first, key_of(first)) if each else ())) if self._trace.wanted else ():
+            if asked in self._trace.wanted:
+                return key, self._trace.wanted[asked]
+        return key, None
 
     def _keep(self, key: str, draw: Draw) -> Value:
         self._trace.drawn[key] = draw
