@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from artsim.common.products import norm
+from artsim.common.elementary import exp, log
+from artsim.common.products import dot, norm
 from artsim.model.details import GRIPS
 from artsim.model.joints import ROTATING
 from artsim.model.objects import ArticulatedObject, JointDynamics
@@ -63,17 +64,17 @@ def _share(obj: ArticulatedObject) -> float:
         return 1.0
     mass = sum(part.body.density * _volume(part.vertices, part.faces) for part in obj.parts if part.body is not None)
     filled = float(row.get("filled", 1.0))
-    low, high = np.log(row["low"]), np.log(row["high"])
-    at = (np.log(filled * mass) - low) / (high - low)
+    low, high = log(float(row["low"])), log(float(row["high"]))
+    at = (log(filled * mass) - low) / (high - low)
     beyond = max(_EDGE - at, at - (1.0 - _EDGE), 0.0)
-    pressed = _EDGE * (1.0 - np.exp(-beyond / _EDGE))
+    pressed = _EDGE * (1.0 - exp(-beyond / _EDGE))
     inside = at if beyond == 0 else _EDGE - pressed if at < 0.5 else 1.0 - _EDGE + pressed
-    return float(np.exp(low + inside * (high - low)) / mass)
+    return exp(low + inside * (high - low)) / mass
 
 
 def _volume(vertices: Any, faces: Any) -> float:
     a, b, c = (vertices[faces[:, i]] for i in range(3))
-    return float(np.einsum("fi,fi->", a, np.cross(b, c))) / 6.0
+    return float(dot(a, np.cross(b, c)).sum()) / 6.0
 
 
 def _dynamics(obj: ArticulatedObject, k: int) -> JointDynamics:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from artsim.common.products import apply, dot, unit
+from artsim.common.elementary import cos, sin
+from artsim.common.products import apply, cross, dot, matmul, norm, unit
 from artsim.model.kinematics import Array
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ def detail_of(
     if outward is None:
         outward = _outward(label, points, surface)
     along = _longest(points, outward)
-    R = np.column_stack([outward, np.cross(along, outward), along])
+    R = np.column_stack([outward, cross(along, outward), along])
     local = apply(R.T, points)
     low, high = local.min(axis=0), local.max(axis=0)
     T = np.eye(4)
@@ -140,21 +141,27 @@ _STANDS_OUT = 0.2
 
 
 def _longest(points: Array, outward: Array) -> Array:
-    """The direction across ``outward`` in which points reach farthest: up, or to the left, where it is nearly so."""
-    across = points - points.mean(axis=0)
-    across = across - dot(across, outward)[:, None] * outward
-    _, axes = np.linalg.eigh(across.T @ across)
-    along = axes[:, 2]
-    for axis in np.eye(3)[[2, 1, 0]]:
-        flat = axis - (axis @ outward) * outward
-        if np.abs(flat).max() > 0.1 and abs(unit(flat) @ along) > _STRAIGHT:
-            along = unit(flat)
-            break
-    return along if along[np.argmax(np.abs(along))] > 0 else -along
+    """The long side of the narrowest rectangle around points seen along ``outward``: up or to the left if nearly so."""
+    flat = np.eye(3) - outward[:, None] * outward
+    up = unit(flat[int(np.argmax(np.abs(flat[2])))] if abs(outward[2]) > _UPRIGHT else flat[2])
+    side = cross(outward, up)
+    v, u = dot(points, up), dot(points, side)
+    angle = 0.0
+    for step in (np.deg2rad(5.0), np.deg2rad(0.5)):
+        tried = angle + step * _FAN
+        widths = np.ptp(cos(tried)[:, None] * u - sin(tried)[:, None] * v, axis=1)
+        angle = float(tried[np.argmin(widths)])
+    standing, lying = np.ptp(u), np.ptp(v)
+    if min(standing, lying) <= _NEARLY * widths.min():
+        angle = 0.0 if standing <= lying else 0.5 * np.pi
+    along = cos(angle) * up + sin(angle) * side
+    along = np.where(np.abs(along) < 1e-9, 0.0, along)
+    return unit(along if along[np.argmax(np.abs(along))] > 0 else -along)
 
 
-_STRAIGHT = 0.97
-"""Cosine above which a direction counts as that of a coordinate axis."""
+_FAN = np.arange(-18, 18)
+_UPRIGHT, _NEARLY = 0.999, 1.05
+"""Cosine above which a direction counts as up; width over the least one, up to which a rectangle may stand straight."""
 
 
 def label_of_visual(name: str) -> str | None:
@@ -172,14 +179,14 @@ def on_faces(points: Array, vertices: Array, faces: NDArray[np.int32], tolerance
     found = np.zeros(len(points), dtype=bool)
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)
-    area = np.linalg.norm(normal, axis=1)
+    area = norm(normal)
     for f in np.flatnonzero(area > 0).tolist():
-        near = ~found & (np.abs((points - a[f]) @ normal[f]) < tolerance * area[f])
+        near = ~found & (np.abs(dot(points - a[f], normal[f])) < tolerance * area[f])
         inside = np.flatnonzero(near)
         for one, two in ((a, b), (b, c), (c, a)):
             edge = two[f] - one[f]
-            beyond = np.cross(edge, points[inside] - one[f]) @ normal[f]
-            inside = inside[beyond > -tolerance * area[f] * np.linalg.norm(edge)]
+            beyond = dot(np.cross(edge, points[inside] - one[f]), normal[f])
+            inside = inside[beyond > -tolerance * area[f] * norm(edge)]
         found[inside] = True
     return found
 
@@ -196,8 +203,8 @@ def detail_of_faces(vertices: Array, faces: NDArray[np.int32], details: Sequence
             candidates = np.flatnonzero(near.all(axis=1))
             a, b, c = (corners[own[:, i]] for i in range(3))
             normal = np.cross(b - a, c - a)
-            length = np.linalg.norm(normal, axis=1)
+            length = norm(normal)
             outwards, offset = normal[length > 0] / length[length > 0, None], a[length > 0]
-            beyond = middles[candidates] @ outwards.T - np.einsum("fi,fi->f", outwards, offset)
+            beyond = matmul(middles[candidates], outwards.T) - dot(outwards, offset)
             found[candidates[beyond.max(axis=1) < _ON_SURFACE]] = number
     return found
