@@ -31,8 +31,8 @@ def build(draws: Draws) -> Assembly:
 
 def _desk(draws: Draws) -> Assembly:
     """Base, arms and shade."""
-    for again in draws.tries():
-        links, beside, foot = _links(again)
+    for _ in draws.tries():
+        links, beside, foot = _links(draws)
         if narrow_limits(links, 0.02):
             break
     lamp = Assembly(density=1200.0)
