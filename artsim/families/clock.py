@@ -4,7 +4,7 @@ What varies: the kind, the outline of the case (round, square, polygon, arch, ho
 hours, two or three hands of several forms and where they point, a pendulum and its bob, weights on chains, a door
 before the pendulum, doors of a cuckoo, a lid, bells with a hammer, knobs, a fork in which the case tilts. Two to eight
 parts move. Hands turn freely about the middle of the face, clockwise as seen from the front. The width is that of the
-face, and other lengths of a clock are mostly shares of half of it.
+face; most other lengths are drawn as shares of it.
 """
 
 import numpy as np
@@ -31,36 +31,38 @@ def build(draws: Draws) -> Assembly:
 def _mantel_clock(draws: Draws) -> Assembly:
     """A case that stands: a block, an arch, a tambour, a house, or a drum on feet."""
     radius = 0.5 * draws.length("width", (0.08, 0.2))
-    deep = radius * draws.number("depth", (0.7, 1.5))
+    deep = draws.length("depth", (0.7, 1.5), of=radius)
     kind = draws.pick("case", ["block", "arch", "tambour", "house", "drum", "lancet"])
-    half = radius * draws.number("case_width", (1.12, 1.5))
-    low = -radius * draws.number("case_bottom", (1.12, 1.8))
+    half = 0.5 * draws.length("case_width", (1.12, 1.5), of=2 * radius)
+    low = -draws.length("case_bottom", (1.12, 1.8), of=radius)
     body = dial_plate(draws, radius)
     body += rim(draws, 1.005 * radius, 0.08 * radius, 0.003 + 0.1 * radius)
     around = [*outline("round", half), (-half, low), (half, low)]
     if kind == "drum":
-        low = -half * draws.number("feet_height", (1.05, 1.4))
+        low = -draws.length("feet_bottom", (1.05, 1.4), of=half)
         body += rod((0.002, deep), 0, 0, half, sections=32)
         for y in (-0.6 * half, 0.6 * half):
             body += box((0.1 * deep, 0.9 * deep), (y - 0.1 * half, y + 0.1 * half), (low, -0.6 * half))
     elif kind in ("tambour", "arch", "lancet"):
         body += prism([*around, (0.0, 1.6 * half)] if kind == "lancet" else around, 0.002, deep, 0)
         if kind == "tambour":
-            wide = half * draws.number("shoulder_width", (1.5, 2.6))
+            wide = 0.5 * draws.length("shoulder_width", (1.5, 2.6), of=2 * half)
             shoulder = low + 0.3 * (0.0 - low)
             body += prism([(-wide, low), (wide, low), (0.95 * wide, shoulder), (half, 0.3 * half), (-half, 0.3 * half),
                            (-0.95 * wide, shoulder)], 0.004, deep - 0.002, 0)  # fmt: skip
     else:
         body += box((0.002, deep), half, (low, half))
         if kind == "house":
-            ridge = half * draws.number("ridge_height", (1.3, 1.8))
+            ridge = draws.length("ridge_height", (1.3, 1.8), of=half)
             body += prism([(-1.1 * half, half), (1.1 * half, half), (0.0, ridge)], -0.008, deep + 0.008, 0)
         elif draws.chance("cornice", 0.6):
             body += box((-0.012, deep + 0.008), 1.12 * half, (half - 0.001, half + 0.1 * half), fillet=0.004)
         if draws.chance("handle", 0.4) and kind == "block":  # on top
             bow = [(0.5 * deep, y, half * 1.1 - 0.004 + z) for y, z in arch(0.4 * half, 0.35 * half, 8)]
             body += tube(bow, 0.04 * half, 8).called("handle", UP)
-    base = half * (draws.number("plinth_width", (1.05, 1.4)) if kind != "tambour" else 2.65)
+    base = 2.65 * half
+    if kind != "tambour":
+        base = 0.5 * draws.length("plinth_width", (1.05, 1.4), of=2 * half)
     if kind != "drum" and draws.chance("plinth", 0.75):
         body += box((-0.014, deep + 0.008), base, (low - 0.15 * half, low + 0.002), fillet=0.004)
     clock = Assembly("body", body, DENSITY)
@@ -88,8 +90,8 @@ def _knobs(draws: Draws, clock: Assembly, x: float, spread: float) -> None:
     """One to three knobs at the back."""
     count = draws.integer("knobs", 1, 3)
     for k in range(count):
-        y, z = (k - 0.5 * (count - 1)) * spread, draws.number("knob_height", (-0.6, 0.3)) * spread
-        r = 0.35 * spread * draws.number("knob_radius", (0.6, 1.0))
+        y, z = (k - 0.5 * (count - 1)) * spread, draws.length("knob_height", (-0.6, 0.3), of=spread)
+        r = draws.length("knob_radius", (0.6, 1.0), of=0.35 * spread)
         knob = rod((x + GAP, x + GAP + 0.5 * r), y, z, 0.5 * r, sections=10)
         knob += box((x + GAP + 0.4 * r, x + GAP + 1.4 * r), about(y, r), about(z, 0.25 * r), fillet=0.2 * r)
         name = f"knob_{k}" if count > 1 else "knob"
@@ -100,9 +102,9 @@ def _longcase_clock(draws: Draws) -> Assembly:
     """A tall case on the floor: a hood with the face, a trunk with pendulum and weights, a plinth."""
     radius = 0.5 * draws.length("width", (0.22, 0.34))
     deep = draws.length("depth", (0.18, 0.28))
-    hood = radius * draws.number("hood_width", (1.15, 1.45))
-    trunk = hood * draws.number("trunk_width", (0.65, 0.95))
-    foot = trunk * draws.number("plinth_width", (1.05, 1.4))
+    hood = 0.5 * draws.length("hood_width", (1.15, 1.45), of=2 * radius)
+    trunk = 0.5 * draws.length("trunk_width", (0.65, 0.95), of=2 * hood)
+    foot = 0.5 * draws.length("plinth_width", (1.05, 1.4), of=2 * trunk)
     length = draws.length("trunk_height", (0.7, 1.1))
     plinth = draws.length("plinth_height", (0.25, 0.45))
     low = -hood - draws.length("below_face", (0.0, 0.05))
@@ -111,7 +113,7 @@ def _longcase_clock(draws: Draws) -> Assembly:
     body += rim(draws, 1.005 * radius, 0.08 * radius, 0.01 + 0.05 * radius)
     crest = draws.pick("crest", ["flat", "gable", "arch", "swan"])
     if crest == "gable":
-        ridge = hood * draws.number("ridge_height", (1.3, 1.7))
+        ridge = draws.length("ridge_height", (1.3, 1.7), of=hood)
         body += prism([(-1.1 * hood, hood), (1.1 * hood, hood), (0, ridge)], -0.02, deep, 0)
     elif crest == "arch":
         body += prism(outline("round", hood).clip((-hood, 0), (hood, hood)) + (0, hood - 0.01), -0.01, deep, 0)
@@ -132,7 +134,7 @@ def _longcase_clock(draws: Draws) -> Assembly:
     body += box((0.5 * deep, deep - 0.005), 0.006, (top + 0.002, top + 0.004))
     clock = Assembly("body", body, DENSITY)
     add_hands(draws, clock, 0.95 * radius)
-    long = (top - bottom) * draws.number("pendulum_length", (0.65, 0.9)) - 0.02
+    long = draws.length("pendulum_length", (0.65, 0.9), of=top - bottom) - 0.02
     clock.add("pendulum", *pendulum(draws, 0.6 * deep, top, long, trunk - 0.025), density=2000.0)
     if draws.chance("door", 0.75):
         glass_door(draws, clock, 0.01, (-trunk + 0.004, trunk - 0.004), (bottom + 0.008, low - 0.034))
@@ -142,25 +144,25 @@ def _longcase_clock(draws: Draws) -> Assembly:
 def _alarm_clock(draws: Draws) -> Assembly:
     """A drum on feet with two bells, or a small case with a button."""
     radius = 0.5 * draws.length("width", (0.05, 0.12))
-    deep = radius * draws.number("depth", (0.6, 1.3))
-    half = radius * draws.number("case_width", (1.08, 1.25))
+    deep = draws.length("depth", (0.6, 1.3), of=radius)
+    half = 0.5 * draws.length("case_width", (1.08, 1.25), of=2 * radius)
     body = dial_plate(draws, radius)
     body += rim(draws, 1.005 * radius, 0.06 * radius, 0.003 + 0.12 * radius)
     if draws.chance("bells", 0.65):
         return _twin_bell_clock(draws, body, radius, deep, half)
-    edge = half * draws.number("case_height", (0.9, 1.3))
+    edge = 0.5 * draws.length("case_height", (0.9, 1.3), of=2 * half)
     kind = draws.pick("case", ["square", "wedge", "drum"])
     if kind == "drum":
         body += rod((0.002, deep), 0, 0, half, sections=32)
         body += box((0.1 * deep, 0.9 * deep), 0.7 * half, (-1.08 * half, -0.5 * half))
         top = half * cos(np.pi / 32)
     else:
-        body += box((0.002, deep), half, edge, fillet=draws.number("case_corner", (0.05, 0.4)) * half, axis=0)
+        body += box((0.002, deep), half, edge, fillet=draws.length("case_corner", (0.05, 0.4), of=half), axis=0)
         if kind == "wedge":
             slope = [(deep - 0.004, -edge), (deep * 1.9, -edge), (deep - 0.004, 0.6 * edge)]
             body += prism(slope, -0.8 * half, 0.8 * half, 1)
         top = edge
-    wide = half * draws.number("button_width", (0.2, 0.55))
+    wide = 0.5 * draws.length("button_width", (0.2, 0.55), of=2 * half)
     body += box((0.3 * deep, 0.7 * deep), 0.7 * wide, (0.9 * top, top + 0.0005))
     clock = Assembly("body", body, DENSITY)
     add_hands(draws, clock, 0.95 * radius)
@@ -177,7 +179,7 @@ def _twin_bell_clock(draws: Draws, body: Solid, radius: float, deep: float, half
     body += rod((0.002, deep), 0, 0, half, sections=32)
     spread = draws.angle("bell_angle", (0.5, 0.75))
     r = 0.07 * radius
-    size = radius * draws.number("bell_radius", (0.38, 0.55))
+    size = draws.length("bell_radius", (0.38, 0.55), of=radius)
     for s in (-1.0, 1.0):
         out = np.array([0.0, s * sin(spread), -cos(spread)])
         foot = middle + 0.9 * half * out
@@ -211,8 +213,8 @@ def _twin_bell_clock(draws: Draws, body: Solid, radius: float, deep: float, half
 def _watch(draws: Draws) -> Assembly:
     """A pocket watch that stands upright: a flat drum with a crown, a bow, and by chance a lid."""
     radius = 0.5 * draws.length("width", (0.032, 0.056))
-    deep = radius * draws.number("depth", (0.25, 0.55))
-    half = radius * draws.number("case_width", (1.06, 1.18))
+    deep = draws.length("depth", (0.25, 0.55), of=radius)
+    half = 0.5 * draws.length("case_width", (1.06, 1.18), of=2 * radius)
     rise = 0.16 * radius
     body = dial_plate(draws, radius)
     body += rod((0.0015, 0.5 * deep), 0, 0, half, sections=30)

@@ -39,8 +39,8 @@ def outline(kind: str, half: float, tall: float = 1.0) -> Array:
 def dial_plate(draws: Draws, radius: float) -> Solid:
     """A round plate whose front is the plane x = 0, with the marks of the hours: bars, dots, or four large ones."""
     kind = draws.pick("marks", ["bars", "dots", "four", "mixed"])
-    size = radius * draws.number("mark_width", (0.02, 0.04))
-    long = radius * draws.number("mark_length", (0.05, 0.11))
+    size = draws.length("mark_width", (0.02, 0.04), of=radius)
+    long = draws.length("mark_length", (0.05, 0.11), of=radius)
     solid = rod((0, 0.004), 0, 0, radius, sections=32)
     for hour, a in enumerate(turns(12)):
         main = hour % 3 == 0
@@ -61,18 +61,18 @@ def add_hands(draws: Draws, clock: Assembly, radius: float, parent: str = "body"
     kind = draws.pick("hand_shape", list(HANDS))
     thick = max(0.012 * radius, 0.0008)
     gap = max(0.006 * radius, 0.0005)
-    wide = radius * draws.number("hand_width", (0.035, 0.1))
-    hub = radius * draws.number("hand_hub", (0.05, 0.09))
+    wide = draws.length("hand_width", (0.035, 0.1), of=radius)
+    hub = draws.length("hand_hub", (0.05, 0.09), of=radius)
     names = ["hour_hand", "minute_hand"] + (["second_hand"] if draws.chance("second_hand", 0.5) else [])
     lengths = {"hour_hand": (0.45, 0.6), "minute_hand": (0.7, 0.9), "second_hand": (0.72, 0.92)}
-    drawn = [draws.number(f"{name}_length", usual) for name, usual in lengths.items()]
+    drawn = [draws.length(f"{name}_length", usual, of=radius) for name, usual in lengths.items()]
     x = 0.0
     for number, name in enumerate(names):
         thin = number == 2
-        long = drawn[number] * radius
+        long = drawn[number]
         w = wide * (0.3 if thin else 1.0 - 0.2 * number)
-        back = draws.number(f"{name}_tail", (0.1, 0.3))
-        tail = long * back if draws.pick(f"{name}_has_tail", [False, True]) else 0.0
+        tail = draws.length(f"{name}_tail", (0.1, 0.3), of=long)
+        tail *= draws.pick(f"{name}_has_tail", [False, True])
         low, high = x - gap - thick, x - gap
         outlines = [np.array(points) * (w, long) for points in HANDS["bar" if thin else kind]]
         if tail:
@@ -87,7 +87,7 @@ def add_hands(draws: Draws, clock: Assembly, radius: float, parent: str = "body"
 
 def rim(draws: Draws, radius: float, wide: float, rise: float) -> Solid:
     """A ring around a face at x = 0, which stands out by ``rise``: bevelled or flat."""
-    inner = draws.number("rim_edge", (0.3, 1.0)) * rise
+    inner = draws.length("rim_edge", (0.3, 1.0), of=rise)
     section = [(radius, -0.003), (radius + wide, -0.003), (radius + wide, inner), (radius, rise)]
     if draws.chance("rim_falls_inward", 0.5):
         section[2], section[3] = (radius + wide, rise), (radius, inner)
@@ -96,7 +96,7 @@ def rim(draws: Draws, radius: float, wide: float, rise: float) -> Solid:
 
 def pendulum(draws: Draws, x: float, top: float, length: float, room: float) -> tuple[Solid, JointSpec]:
     """A rod with a bob that hangs from height ``top``; its joint swings within a case of half width ``room``."""
-    bob = min(length * draws.number("bob_radius", (0.1, 0.22)), 0.55 * room)
+    bob = min(draws.length("bob_radius", (0.1, 0.22), of=length), 0.55 * room)
     z = top - length + bob
     thin = max(0.008 * length, 0.0012)
     solid = rod(x - 0.5 * thin, 0, (top, z), thin, sections=8)
@@ -122,7 +122,7 @@ def glass_door(
     draws = draws.within("door")
     thick = draws.length("thickness", (0.006, 0.012))
     low, high = (x - GAP - thick, across[0], upright[0]), (x - GAP, across[1], upright[1])
-    bar = draws.number("frame", (0.1, 0.2)) * (across[1] - across[0])
+    bar = draws.length("frame", (0.1, 0.2), of=across[1] - across[0])
     door = frame(low, high, [bar] * 4)
     middle = 0.5 * (upright[0] + upright[1])
     if draws.chance("crossbar", 0.3):

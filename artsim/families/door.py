@@ -129,9 +129,8 @@ def _frame(draws: Draws, width: float, height: float, depth: float, jamb: float,
         lights = np.linspace(0, height, draws.integer("side_light_panes", 1, 4) + 1)[1:-1]
         solid += grid_panel(low, high, [0.05, 0.05, 0.1, jamb], [], lights, 0.03, 0.006)
     elif extra == "wall":  # or fixed panels, beside and above
-        beside = draws.number(
-            "wall_width", (0.2, 2.0), (0.2, 12.0), tails=0.3
-        )  # up to a shop front or a long partition
+        # Up to a shop front or a long partition.
+        beside = draws.number("wall_width", (0.2, 2.0), (0.2, 12.0), tails=0.3)
         shares = draws.numbers("wall_side", 0.0 if beside < 4.0 else 0.7, 1.0, 2)
         left, right = shares * min(beside * width, 3.7) + 0.02
         above = draws.length("wall_above", (0.02, 0.6 if beside < 4.0 else 0.2))
@@ -140,8 +139,8 @@ def _frame(draws: Draws, width: float, height: float, depth: float, jamb: float,
     elif extra == "arch":
         angles = np.linspace(0.0, np.pi, 17)
         radius, base = y + jamb, height + jamb - 0.002
-        rise = draws.number("arch_rise", (0.3, 1.0))
-        rim = np.stack([np.zeros(17), radius * cos(angles), base + rise * radius * sin(angles)], axis=1)
+        rise = draws.length("arch_rise", (0.3, 1.0), of=radius)
+        rim = np.stack([np.zeros(17), radius * cos(angles), base + rise * sin(angles)], axis=1)
         solid += hull(np.concatenate([rim + (x0, 0, 0), rim + (x1, 0, 0)]))
     return solid
 

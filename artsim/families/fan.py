@@ -28,21 +28,21 @@ def _head_fan(draws: Draws) -> Assembly:
     """A head with a cage on a neck, on a table stand or a tall column."""
     standing = draws.chance("standing", 0.5)
     cage = 0.5 * draws.length("width", (0.34, 0.5) if standing else (0.26, 0.4))
-    column = cage * draws.number("column_radius", (0.08, 0.12))
-    height = draws.length("height", (0.7, 1.1)) if standing else cage * draws.number("height", (1.15, 1.5))
+    column = draws.length("column_radius", (0.08, 0.12), of=cage)
+    height = draws.length("height", (0.7, 1.1)) if standing else draws.length("height", (1.15, 1.5), of=cage)
     sliding = standing and draws.chance("telescopic", 0.6)
     swings, tilts = draws.chance("oscillates", 0.75), draws.chance("tilts", 0.75)
-    motor = cage * draws.number("motor_radius", (0.26, 0.36))
+    motor = draws.length("motor_radius", (0.26, 0.36), of=cage)
     level = height + 1.3 * motor + 0.02
     base = _foot(draws, cage, standing)
     stages: list[tuple[str, Solid, JointSpec | None]] = []  # each on the one before, or, without a joint, part of it
     if sliding:
-        sleeve = height * draws.number("sleeve_height", (0.5, 0.65))
+        sleeve = draws.length("sleeve_height", (0.5, 0.65), of=height)
         wide = 1.45 * column
         base += rod(0, 0, (0.005, 0.04), wide, sections=20)
         base += ring((0, 0, 0.5 * (0.02 + sleeve)), UP, column + GAP, wide, sleeve - 0.02, 16)
         base += ring((0, 0, sleeve - 0.02), UP, column + GAP, 1.25 * wide, 0.05, 16)
-        deep = draws.number("pole_depth", (0.4, 0.8)) * (sleeve - 0.06)
+        deep = draws.length("pole_depth", (0.4, 0.8), of=sleeve - 0.06)
         pole = rod(0, 0, (sleeve - deep, height), column, sections=18)
         stages.append(("pole", pole, prismatic("", UP, 0.0, 0.75 * deep, (0, 0, sleeve))))
     else:
@@ -96,7 +96,7 @@ def _neck(column: float, motor: float, z: float, level: float, side: float) -> S
 
 def _head(draws: Draws, cage: float, motor: float, level: float, pins: float, back: float) -> tuple[Solid, float]:
     """Motor with the cage before it; and the x of the middle of the cage."""
-    half = cage * draws.number("cage_depth", (0.17, 0.26))
+    half = 0.5 * draws.length("cage_depth", (0.17, 0.26), of=2 * cage)
     middle = back - half
     wide = 0.75 * motor
     solid = rod((back, 0.6 * motor), 0, 0, wide)
@@ -110,7 +110,7 @@ def _cage(draws: Draws, cage: float, half: float, motor: float) -> Solid:
     """Wires before and behind the blades, about the X axis; the front badge at -X, the motor at +X."""
     wire = max(0.009 * cage, 0.0016)
     wires = circle((0, 0, 0), FRONT, 1.0, draws.integer("cage_wires", 10, 16))
-    badge = cage * draws.number("badge_radius", (0.14, 0.26))
+    badge = draws.length("badge_radius", (0.14, 0.26), of=cage)
     solid = tube(circle((0, 0, 0), FRONT, cage, 24), 2.2 * wire, 8, closed=True)
     solid += rod((-half - 1.5 * wire, -half + wire), 0, 0, 0.85 * badge, badge)
     for name, x, hub in (("front", -half, 0.85 * badge), ("back", half, 0.8 * motor)):
@@ -124,11 +124,11 @@ def _cage(draws: Draws, cage: float, half: float, motor: float) -> Solid:
 def _blades(draws: Draws, cage: float, depth: float) -> Solid:
     """A propeller about the X axis, within a cage of the given radius and depth."""
     count = draws.integer("blades", 3, 6)
-    hub = cage * draws.number("hub_radius", (0.13, 0.2))
-    tip = cage * draws.number("blade_length", (0.78, 0.86))
+    hub = draws.length("hub_radius", (0.13, 0.2), of=cage)
+    tip = draws.length("blade_length", (0.78, 0.86), of=cage)
     reach = 0.2 * depth
     solid = rod((-reach, reach), 0, 0, 0.85 * hub, hub)
-    broad = draws.number("blade_width", (0.45, 0.75)) * 2.0 * np.pi / count
+    broad = draws.number("blade_spread", (0.45, 0.75)) * 2.0 * np.pi / count
     sweep = draws.angle("blade_sweep", (-0.5, 0.5))
     shares = np.array([0.0, 0.35, 0.75, 1.0])
     widths = np.array([0.75, 1.0, 1.0, draws.number("blade_tip_width", (0.4, 0.8))])
@@ -152,7 +152,7 @@ def _blades(draws: Draws, cage: float, depth: float) -> Solid:
 def _box_fan(draws: Draws) -> Assembly:
     """Blades in a square frame, with a knob by chance."""
     cage = 0.5 * draws.length("width", (0.28, 0.52))
-    half = cage * draws.number("depth", (0.22, 0.32))
+    half = 0.5 * draws.length("depth", (0.22, 0.32), of=2 * cage)
     wall, outer = 0.014, 1.06 * cage + 0.014
     base = frame((-half, -outer, -outer), (half, outer, outer), [wall] * 4)
     for y in (-0.7 * outer, 0.7 * outer):
@@ -191,16 +191,16 @@ def _ceiling_fan(draws: Draws) -> Assembly:
     count, body = draws.integer("blades", 3, 6), draws.length("motor_radius", (0.08, 0.13))
     mount = rod(0, 0, (-0.05, 0), 0.045, 0.07) + rod(0, 0, (-drop, -0.02), 0.013, sections=14)
     low = -drop - GAP
-    tall = body * draws.number("motor_height", (0.7, 1.2))
+    tall = draws.length("motor_height", (0.7, 1.2), of=body)
     rotor = rod(0, 0, (low - 0.25 * tall, low), body, 0.5 * body, 28)
     rotor += rod(0, 0, (low - tall, low - 0.24 * tall), 0.9 * body, body, 28)
     if draws.chance("lamp", 0.6):
-        bowl = (0.75 * body, 0.75 * body, body * draws.number("lamp_height", (0.4, 0.8)))
+        bowl = (0.75 * body, 0.75 * body, draws.length("lamp_height", (0.4, 0.8), of=body))
         rotor += ellipsoid((0, 0, low - tall), bowl, 20)
     half, z = 0.5 * draws.length("blade_width", (0.1, 0.16)), low - 0.6 * tall
     pitch = np.deg2rad(draws.degrees("blade_pitch", (8.0, 15.0)))
     root = body + draws.length("blade_arm", (0.03, 0.08))
-    corner = draws.number("blade_corner", (0.2, 1.0)) * half
+    corner = draws.length("blade_corner", (0.2, 1.0), of=half)
     paddle = box((-reach, -root), half, 0.004, fillet=corner, axis=2, steps=4)
     arm = box((-root - 0.06, -0.8 * body), 0.02, 0.0055)
     blade = (paddle + arm).turned(FRONT, pitch).moved((0, 0, z))
@@ -212,7 +212,7 @@ def _ceiling_fan(draws: Draws) -> Assembly:
 
 def _foot(draws: Draws, cage: float, standing: bool) -> Solid:
     """Disc, or a cross of bars."""
-    wide = cage * draws.number("foot_width", (0.85, 1.05))
+    wide = draws.length("foot_radius", (0.85, 1.05), of=cage)
     if standing and draws.chance("foot_crossed", 0.4):
         half = 0.022
         return box(wide, half, (0, 0.025)) + box(half, wide, (0, 0.025))

@@ -33,17 +33,17 @@ def _basin_mixer(draws: Draws) -> Assembly:
     height = draws.length("height", (0.06, 0.2), (0.04, 0.5), tails=0.3)
     reach = draws.length("depth", (0.08, 0.17), (0.05, 0.8), tails=0.3)
     body = _body(draws, radius, height)
-    r = radius * draws.number("spout_radius", (0.5, 0.8))
+    r = draws.length("spout_radius", (0.5, 0.8), of=radius)
     kind = draws.pick("spout", ["straight", "bar", "drooping", "bow"])
-    root = np.array([0.0, 0.0, height * draws.number("spout_root", (0.35, 0.75))])
+    root = np.array([0.0, 0.0, draws.length("spout_root", (0.35, 0.75), of=height)])
     if kind == "straight":
-        rise = min(draws.number("spout_rise", (-0.3, 0.35)) * reach, height - root[2] - 2 * r)
+        rise = min(draws.length("spout_rise", (-0.3, 0.35), of=reach), height - root[2] - 2 * r)
         tip = root + (-reach, 0, rise)
         body += tube([root, tip], [r, 0.85 * r], 16) + _nozzle(draws, tip + (0.75 * r, 0, 0), -UP, 0.7 * r, 1.2 * r)
     elif kind == "bar":
-        half = r * draws.number("spout_width", (0.8, 1.5))
-        thick = r * draws.number("spout_thickness", (0.35, 0.6))
-        rise = min(draws.number("spout_rise", (-0.1, 0.25)) * reach, height - root[2] - 2 * r)
+        half = 0.5 * draws.length("spout_width", (0.8, 1.5), of=2 * r)
+        thick = 0.5 * draws.length("spout_thickness", (0.35, 0.6), of=2 * r)
+        rise = min(draws.length("spout_rise", (-0.1, 0.25), of=reach), height - root[2] - 2 * r)
         tip = root + (-reach, 0, rise)
         ends = [box(p - (0.006, half, thick), p + (0.006, half, thick), fillet=0.4 * thick) for p in (root, tip)]
         body += hull_of(*ends) + _nozzle(draws, tip + (0.008, 0, 0), -UP, 0.6 * thick, 1.4 * thick)
@@ -64,7 +64,7 @@ def _basin_mixer(draws: Draws) -> Assembly:
     if lean:  # the axis stands on a stub, so that the hub's rim clears the body's top
         body += cylinder(pivot - 2.5 * radius * sin(abs(lean)) * axis, pivot, 0.9 * radius)
     tap = Assembly("base", body, BRASS)
-    hub = radius * draws.number("handle_radius", (0.9, 1.0))
+    hub = draws.length("handle_radius", (0.9, 1.0), of=radius)
     handle = _handle(draws, hub, draws.length("handle_length", (0.05, 0.12)), True)
     mixes = draws.chance("handle_turns_both_ways", 0.7) and lean <= 0
     low, high = (-0.5 * np.pi, 0.5 * np.pi) if mixes else (0.0, draws.angle("handle_travel", (0.8, 1.9)))
@@ -78,14 +78,14 @@ def _kitchen_mixer(draws: Draws) -> Assembly:
     body = _body(draws, radius, height)
     side = draws.side("handle_side")
     out = np.array([0.0, side, 0.0])
-    level = height * draws.number("handle_level", (0.45, 0.7))
-    stem = radius * draws.number("handle_stem", (1.15, 1.6))
-    hub = min(radius * draws.number("hub_radius", (0.6, 0.85)), level - 0.012, height - level - 0.002)
+    level = draws.length("handle_level", (0.45, 0.7), of=height)
+    stem = draws.length("handle_stem", (1.15, 1.6), of=radius)
+    hub = min(draws.length("hub_radius", (0.6, 0.85), of=radius), level - 0.012, height - level - 0.002)
     body += rod(0, (0, side * stem), level, hub, sections=20)
     length = draws.length("handle_length", (0.05, 0.09), (0.05, 0.15), tails=0.2)
     # A turning spout passes over the lever, wherever that points.
     lowest = level + 1.2 * length + 0.02
-    r = radius * draws.number("spout_radius", (0.4, 0.7))
+    r = draws.length("spout_radius", (0.4, 0.7), of=radius)
     reach = draws.length("depth", (0.13, 0.24), (0.1, 0.5), tails=0.2)
     tip = max(lowest, height + 0.03) + draws.length("spout_lift", (0.0, 0.1), (0.0, 0.4), tails=0.2)
     spout = _gooseneck(draws, height, r, reach, tip)
@@ -93,7 +93,7 @@ def _kitchen_mixer(draws: Draws) -> Assembly:
     pivot = np.array([0.0, side * stem, level])
     _add_spout(draws, tap, spout, height, 0.75, 0.5)
     upright = draws.chance("handle_upright", 0.6)
-    handle = _handle(draws, hub * draws.number("handle_radius", (0.9, 1.0)), length, False)
+    handle = _handle(draws, draws.length("handle_radius", (0.9, 1.0), of=hub), length, False)
     travel = draws.angle("handle_travel", (0.8, 1.57))
     axis = -out * side if upright else out * side  # towards the user, or up
     joint = revolute("base", axis, pivot, 0.0, travel)
@@ -108,12 +108,12 @@ def _three_piece(draws: Draws) -> Assembly:
     plate = draws.length("plate_thickness", (0.005, 0.012))
     half = radius + draws.length("plate_margin", (0.003, 0.012))
     base = box(half, spread + half, (0, plate), fillet=half, axis=2, steps=5)
-    hub = draws.number("foot_taper", (0.45, 0.9)) * radius
+    hub = draws.length("foot_top_radius", (0.45, 0.9), of=radius)
     for y in (-spread, spread):
         base += rod(0, y, (0.5 * plate, height), radius, hub)
         base += rod(0, y, (0.5 * plate, plate + 0.004), 1.1 * radius)
-    r = radius * draws.number("spout_radius", (0.4, 0.6))
-    column = height * draws.number("column_height", (0.6, 1.3)) + 0.01
+    r = draws.length("spout_radius", (0.4, 0.6), of=radius)
+    column = draws.length("column_height", (0.6, 1.3), of=height) + 0.01
     base += rod(0, 0, (0.5 * plate, column), radius, max(hub, 1.2 * r))
     reach = draws.length("depth", (0.1, 0.18), (0.06, 0.35), tails=0.25)
     length = min(draws.length("handle_length", (0.05, 0.08)), spread - radius - 0.012)
@@ -146,7 +146,7 @@ def _pillar_tap(draws: Draws) -> Assembly:
     body += rod(0, 0, (height - 0.002, height + 0.02), 0.45 * radius, sections=16)
     tap = Assembly("base", body, BRASS)
     pivot = np.array([0.0, 0.0, height + 0.02])
-    knob = _knob(draws, radius * draws.number("knob_radius", (1.2, 1.7)))
+    knob = _knob(draws, draws.length("knob_radius", (1.2, 1.7), of=radius))
     travel = draws.number("handle_turns", (0.5, 2.5)) * 2.0 * np.pi
     tap.add("handle", _placed(knob, pivot, UP, FRONT), screw("base", UP, pivot, 0.0, travel, 0.0005))
     return tap
@@ -168,14 +168,14 @@ def _wall_tap(draws: Draws) -> Assembly:
     bend = 2.2 * r
     low = -drop - GAP
     path = np.stack([bend * (cos(s) - 1), 0 * s, low - 0.7 * r - bend * sin(s)], axis=1)
-    rise = draws.number("spout_rise", (-0.1, 0.25)) * reach
+    rise = draws.length("spout_rise", (-0.1, 0.25), of=reach)
     path = np.concatenate([[[0, 0, low]], path, path[-1:] + [[-reach, 0, rise]]])
     spout = tube(path, r, 14) + _nozzle(draws, path[-1] + (r, 0, 0), -UP, 0.8 * r, 1.4 * r)
     tap = Assembly("base", body, BRASS)
     limit = min(arcsin(min((half - 0.03) / (reach + bend + 2 * r), 1.0)), 1.2)
     tap.add("spout", spout, revolute("base", UP, (0, 0, low), -limit, limit))
     alike = draws.fork("", draws.seed("handle_seed") // 2)
-    knob = _knob(alike, radius * draws.number("knob_radius", (1.3, 2.2)))
+    knob = _knob(alike, draws.length("knob_radius", (1.3, 2.2), of=radius))
     turn = min(draws.angle("handle_travel", (1.57, 3.0), (0.8, 3.4), tails=0.4), np.pi)
     for number, side in enumerate((-1.0, 1.0)):
         pivot, out = np.array([0.0, side * half, 0.0]), np.array([0.0, side, 0.0])
@@ -185,7 +185,7 @@ def _wall_tap(draws: Draws) -> Assembly:
 
 def _body(draws: Draws, radius: float, height: float) -> Solid:
     """Upright body on a foot."""
-    foot = radius * draws.number("base_radius", (1.1, 1.5))
+    foot = draws.length("base_radius", (1.1, 1.5), of=radius)
     thick = draws.length("base_height", (0.004, 0.012))
     kind = draws.pick("body", {"round": 0.4, "tapered": 0.25, "square": 0.15, "turned": 0.2})
     if kind == "square":
@@ -197,7 +197,7 @@ def _body(draws: Draws, radius: float, height: float) -> Solid:
     if kind == "turned":
         for level in draws.numbers("body_ring_level", 0.12, 0.9, 3) * height:
             h = 0.1 * radius
-            solid += rod(0, 0, (level - h, level + h), radius * draws.number("body_ring_radius", (1.05, 1.2)))
+            solid += rod(0, 0, (level - h, level + h), draws.length("body_ring_radius", (1.05, 1.2), of=radius))
     return solid
 
 
@@ -235,7 +235,7 @@ def _gooseneck(draws: Draws, foot: float, r: float, reach: float, tip: float) ->
 
 def _nozzle(draws: Draws, start: Array, direction: Array, radius: float, length: float) -> Solid:
     """The aerator at the mouth."""
-    wide = radius * draws.number("nozzle_radius", (1.0, 1.15))
+    wide = draws.length("nozzle_radius", (1.0, 1.15), of=radius)
     return cylinder(start, start + length * unit(direction), wide, sections=18)
 
 
@@ -252,7 +252,7 @@ def _handle(draws: Draws, radius: float, length: float, crowned: bool) -> Solid:
     kind = draws.pick("handle", {"rod": 0.4, "paddle": 0.35, "ball": 0.12, "knob": 0.13})
     if kind == "knob" and not crowned:
         return _knob(draws, min(1.5 * radius, 0.4 * length))
-    tall, taper = radius * draws.number("hub_height", (0.9, 1.7)), draws.number("hub_taper", (0.85, 1.0))
+    tall, taper = draws.length("hub_height", (0.9, 1.7), of=radius), draws.number("hub_taper", (0.85, 1.0))
     if draws.chance("hub_domed", 0.5):
         hub = rod(0, 0, (GAP, GAP + 0.75 * tall), radius) + _dome(GAP + 0.75 * tall, radius)
     else:
@@ -260,18 +260,18 @@ def _handle(draws: Draws, radius: float, length: float, crowned: bool) -> Solid:
     lean = draws.angle("lever_rise", (0.0, 0.45))
     root = (GAP + 0.65 * tall) * UP
     tip = root + length * (cos(lean) * FRONT + sin(lean) * UP)
-    r = max(radius * draws.number("lever_radius", (0.18, 0.3)), 0.003)
+    r = max(draws.length("lever_radius", (0.18, 0.3), of=radius), 0.003)
     if kind == "paddle":
-        wide = radius * draws.number("paddle_width", (0.45, 0.9))
-        thick = max(radius * draws.number("paddle_thickness", (0.12, 0.22)), 0.002)
+        wide = 0.5 * draws.length("paddle_width", (0.45, 0.9), of=2 * radius)
+        thick = max(0.5 * draws.length("paddle_thickness", (0.12, 0.22), of=2 * radius), 0.002)
         middle = 0.5 * (root + tip) + draws.number("paddle_bulge", (0.0, 1.0)) * 0.1 * length * UP
-        narrow = wide * draws.number("paddle_tip_width", (0.5, 1.0))
+        narrow = 0.5 * draws.length("paddle_tip_width", (0.5, 1.0), of=2 * wide)
         slabs = [
             hull_of(*(ellipsoid(p + s * (w - thick) * SIDE, thick, 8) for s in (-1, 1)))
             for p, w in ((root, wide), (middle, wide), (tip, narrow))
         ]
         return hub + hull_of(slabs[0], slabs[1]) + hull_of(slabs[1], slabs[2])
-    end = r * draws.number("lever_taper", (0.8, 1.2))
+    end = draws.length("lever_tip_radius", (0.8, 1.2), of=r)
     if kind == "ball":
         return hub + tube([root, tip], 0.7 * r, 12) + ellipsoid(tip, 1.6 * r, 14)
     return hub + tube([root, tip], [r, end], 12) + ellipsoid(tip, r, 12)
@@ -285,11 +285,11 @@ def _dome(z: float, radius: float) -> Solid:
 
 def _knob(draws: Draws, radius: float) -> Solid:
     """A cross or a round knob at the origin, to turn with the whole hand."""
-    tall = radius * draws.number("knob_height", (0.6, 0.9))
+    tall = draws.length("knob_height", (0.6, 0.9), of=radius)
     if draws.chance("knob_crossed", 0.55):
         center = (0, 0, GAP + 0.55 * tall)
         arms = [(radius * cos(a), radius * sin(a), center[2]) for a in turns(draws.integer("knob_arms", 3, 5))]
-        r = radius * draws.number("knob_arm_radius", (0.14, 0.2))
+        r = draws.length("knob_arm_radius", (0.14, 0.2), of=radius)
         solid = rod(0, 0, (GAP, GAP + tall), 0.45 * radius, 0.35 * radius, 18)
         return solid + union(tube([center, tip], r, 10) + ellipsoid(tip, 1.35 * r, 10) for tip in arms)
     solid = rod(0, 0, (GAP, GAP + tall), radius, 0.85 * radius) + _dome(GAP + tall, 0.7 * radius)

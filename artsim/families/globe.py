@@ -26,8 +26,8 @@ def build(draws: Draws) -> Assembly:
     lean = np.deg2rad({"earth": 23.4, "other": other}[draws.pick("axis", ["earth", "other"])])
     lean *= {"left": -1.0, "right": 1.0}[draws.pick("leans_to", ["left", "right"])]
     axis = apply(rotation_about((1, 0, 0), lean), UP)
-    thick = radius * draws.number("arc_thickness", (0.04, 0.075))
-    arc_radius = radius * draws.number("arc_radius", (1.08, 1.16)) + thick
+    thick = draws.length("arc_thickness", (0.04, 0.075), of=radius)
+    arc_radius = draws.length("arc_radius", (1.08, 1.16), of=radius) + thick
     sphere = ellipsoid((0, 0, 0), radius, 36) + _continents(draws, radius)
     pin = 0.45 * thick
     for side in (-1.0, 1.0):
@@ -83,7 +83,7 @@ def _arc(draws: Draws, radius: float, thick: float, tilt: float) -> Solid:
     angles = tilt + angles
     along = np.stack([0 * angles, -sin(angles), cos(angles)], axis=1)
     if flat:
-        wide, t = thick * draws.number("arc_width", (0.8, 1.6)), 0.5 * thick
+        wide, t = 0.5 * draws.length("arc_width", (0.8, 1.6), of=2 * thick), 0.5 * thick
         rings = [[(x, *(p[1:] * r)) for r in (radius - t, radius + t) for x in (-wide, wide)] for p in along]
         solid = union(hull(np.concatenate([a, b])) for a, b in pairwise(rings))
     else:
@@ -101,14 +101,14 @@ def _arc(draws: Draws, radius: float, thick: float, tilt: float) -> Solid:
 
 def _stand(draws: Draws, radius: float, top: float, thick: float) -> Solid:
     """Column below the arc, on a foot."""
-    height = radius * draws.number("stand_height", (0.15, 0.9))
+    height = draws.length("stand_height", (0.15, 0.9), of=radius)
     low = top - height
-    stem = thick * draws.number("stem_radius", (0.9, 1.3))
+    stem = draws.length("stem_radius", (0.9, 1.3), of=thick)
     solid = rod(0, 0, (low, top), stem, sections=18)
     if draws.chance("knop", 0.5):
-        z = low + draws.number("knop_height", (0.3, 0.7)) * height
+        z = low + draws.length("knop_height", (0.3, 0.7), of=height)
         solid += ellipsoid((0, 0, z), (1.8 * stem, 1.8 * stem, 0.14 * height), 16)
-    wide = radius * draws.number("foot_width", (0.55, 0.85))
+    wide = draws.length("foot_radius", (0.55, 0.85), of=radius)
     kind = draws.pick("foot", ["disc", "stepped", "plinth", "legs", "dome"])
     if kind == "legs":
         for a in turns(draws.integer("leg_count", 3, 4)):
@@ -117,7 +117,7 @@ def _stand(draws: Draws, radius: float, top: float, thick: float) -> Solid:
             path = np.outer([0.0, 0.5 * wide, wide], out) + np.outer(heights, UP)
             solid += tube(path, [stem, 0.8 * stem, 0.7 * stem], 10) + ellipsoid(path[-1], 0.9 * stem, 10)
         return solid
-    tall = radius * draws.number("foot_height", (0.06, 0.14))
+    tall = draws.length("foot_height", (0.06, 0.14), of=radius)
     if kind == "plinth":
         return solid + box(wide, wide, (low - tall, low + 0.002), fillet=0.1 * wide, axis=2)
     solid += rod(0, 0, (low - tall, low + 0.002), wide, 0.9 * wide, 32)

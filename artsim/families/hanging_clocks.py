@@ -14,16 +14,16 @@ from artsim.making.solids import box, ellipsoid, frame, hull_of, prism, rod, tub
 def wall_clock(draws: Draws) -> Assembly:
     """A plain case, or a face with rays."""
     radius = 0.5 * draws.length("width", (0.14, 0.5))
-    deep = radius * draws.number("depth", (0.1, 0.5))
+    deep = draws.length("depth", (0.1, 0.5), of=radius)
     kind = draws.pick("case", ["round", "round", "square", "octagon", "dodecagon", "hexagon", "rays"])
     oblong = kind == "square" and not draws.chance("square", 0.5)
-    tall = draws.number("case_height", (1.05, 1.5)) if oblong else 1.0
-    edge = draws.number("case_width", (1.04, 1.35))
+    tall = draws.number("case_stretch", (1.05, 1.5)) if oblong else 1.0
+    edge = draws.number("case_edge", (1.04, 1.35))
     body = dial_plate(draws, radius)
     if kind == "rays":
         body += rod((0.002, deep), 0, 0, 1.02 * radius, sections=32)
-        count, reach = draws.integer("rays", 6, 16), draws.number("ray_length", (1.35, 2.0))
-        r = radius * draws.number("ray_radius", (0.02, 0.05))
+        count, reach = draws.integer("rays", 6, 16), draws.number("ray_reach", (1.35, 2.0))
+        r = draws.length("ray_radius", (0.02, 0.05), of=radius)
         for k, a in enumerate(turns(count)):
             out = np.array([0.0, cos(a), sin(a)])
             far = reach * (1.0 if k % 2 else draws.number("short_ray", (0.75, 1.0))) * radius
@@ -35,8 +35,8 @@ def wall_clock(draws: Draws) -> Assembly:
         body += prism(outline(kind, around * radius, tall), 0.002, deep, 0)
         if draws.chance("case_step", 0.4):
             body += prism(outline(kind, 1.06 * around * radius, tall), 0.4 * deep, 0.9 * deep, 0)
-    wide = radius * draws.number("rim_width", (0.03, min(0.3, edge - 0.99)))
-    body += rim(draws, 1.005 * radius, wide, 0.003 + radius * draws.number("rim_rise", (0.05, 0.2)))
+    wide = draws.length("rim_width", (0.03, min(0.3, edge - 0.99)), of=radius)
+    body += rim(draws, 1.005 * radius, wide, 0.003 + draws.length("rim_rise", (0.05, 0.2), of=radius))
     clock = Assembly("body", body, DENSITY)
     add_hands(draws, clock, 0.95 * radius)
     if draws.chance("knob", 0.15) and deep > 0.02 and kind != "rays":
@@ -51,26 +51,26 @@ def pendulum_clock(draws: Draws) -> Assembly:
     radius = 0.5 * draws.length("width", (0.12, 0.28))
     deep = draws.length("depth", (0.05, 0.11))
     kind = draws.pick("case", ["round", "octagon", "square", "house", "arch"])
-    half = radius * draws.number("case_width", (1.1, 1.35))
+    half = 0.5 * draws.length("case_width", (1.1, 1.35), of=2 * radius)
     body = dial_plate(draws, radius)
     body += rim(draws, 1.005 * radius, 0.06 * radius, 0.003 + 0.1 * radius)
     low = -half
     if kind in ("house", "arch"):
         body += box((0.002, deep), half, half)
         if kind == "house":
-            ridge = half * draws.number("ridge_height", (1.4, 1.9))
+            ridge = draws.length("ridge_height", (1.4, 1.9), of=half)
             body += prism([(-1.15 * half, half), (1.15 * half, half), (0.0, ridge)], -0.01, deep, 0)
         else:
             body += prism(outline("round", half).clip((-half, 0), (half, half)) + (0, 0.9 * half), 0.002, deep, 0)
     else:
         body += prism(outline(kind, half if kind != "octagon" else half / cos(np.pi / 8)), 0.002, deep, 0)
     clock = Assembly("body", body, DENSITY)
-    length = radius * draws.number("pendulum_length", (1.4, 3.6))
+    length = draws.length("pendulum_length", (1.4, 3.6), of=radius)
     if draws.chance("pendulum_free", 0.35):  # in the open below the case
         swinging = pendulum(draws, 0.4 * deep, low - 0.004, length, half)
         clock.body += box((0.35 * deep, 0.45 * deep), 0.004, (low - 0.0025, low + 0.01))
     else:
-        room = half * draws.number("box_width", (0.5, 0.85))
+        room = 0.5 * draws.length("box_width", (0.5, 0.85), of=2 * half)
         bottom = low - length - 0.02
         clock.body += frame((0.006, -room - 0.01, bottom - 0.012), (deep, room + 0.01, low + 0.01), [0.01] * 4)
         clock.body += box((deep - 0.008, deep), room + 0.005, (bottom - 0.008, low + 0.005))
@@ -89,10 +89,10 @@ def pendulum_clock(draws: Draws) -> Assembly:
 def cuckoo_clock(draws: Draws) -> Assembly:
     """A house with a steep roof, a small door for the bird, a leaf as a pendulum, and cones on chains."""
     radius = 0.5 * draws.length("width", (0.07, 0.12))
-    deep, half = draws.length("depth", (0.06, 0.1)), radius * draws.number("case_width", (1.4, 2.0))
-    low = -radius * draws.number("case_bottom", (1.25, 1.6))
-    eaves = radius * draws.number("eaves_height", (1.6, 2.2))
-    ridge = eaves + half * draws.number("roof_slope", (0.7, 1.2))
+    deep, half = draws.length("depth", (0.06, 0.1)), 0.5 * draws.length("case_width", (1.4, 2.0), of=2 * radius)
+    low = -draws.length("case_bottom", (1.25, 1.6), of=radius)
+    eaves = draws.length("eaves_height", (1.6, 2.2), of=radius)
+    ridge = eaves + draws.length("roof_height", (0.7, 1.2), of=half)
     body = dial_plate(draws, radius) + box((0.002, deep), half, (low, eaves))
     body += prism([(-half, eaves - 0.001), (half, eaves - 0.001), (0, ridge)], 0.002, deep, 0)
     thick, over = 0.08 * half, 1.25
@@ -104,7 +104,7 @@ def cuckoo_clock(draws: Draws) -> Assembly:
     body += rim(draws, 1.005 * radius, 0.1 * radius, 0.006)
     top, wide = eaves + 0.25 * (ridge - eaves), 0.22 * half
     base = radius * 1.15
-    length = radius * draws.number("pendulum_length", (1.5, 3.0))
+    length = draws.length("pendulum_length", (1.5, 3.0), of=radius)
     body += box((0.35 * deep, 0.45 * deep), 0.004, (low - 0.0025, low + 0.01))
     clock = Assembly("body", body, DENSITY)
     add_hands(draws, clock, 0.95 * radius)
@@ -119,7 +119,7 @@ def cuckoo_clock(draws: Draws) -> Assembly:
     if draws.chance("weight", 0.7):
         x, r = 0.8 * deep, 0.14 * radius
         for number, y in enumerate((-0.35 * half, 0.35 * half)):
-            drop = length * draws.number("chain_length", (0.6, 1.6))
+            drop = draws.length("chain_length", (0.6, 1.6), of=length)
             weight = rod(x, y, (low - GAP, low - drop), 0.001, sections=6)
             weight += hull_of(rod(x, y, (low - drop, low - drop - 3 * r), r, 0.5 * r, 10),
                               ellipsoid((x, y, low - drop - 0.5 * r), r, 10))  # fmt: skip

@@ -28,9 +28,9 @@ def standing(draws: Draws) -> Assembly:
     flat = foot in ("disc", "square")
     slides = flat and draws.chance("pole", 0.35)
     if slides:
-        sleeve, bore = draws.number("sleeve_height", (0.4, 0.6)) * height, 0.6 * radius
+        sleeve, bore = draws.length("sleeve_height", (0.4, 0.6), of=height), 0.6 * radius
         base += ring((0, 0, 0.5 * (floor + sleeve)), UP, bore + 0.001, radius + 0.002, sleeve - floor + 0.01, 12)
-        travel = draws.number("pole_travel", (0.4, 0.8)) * (sleeve - floor)
+        travel = draws.length("pole_travel", (0.4, 0.8), of=sleeve - floor)
         pole = rod(0, 0, (sleeve - travel - 0.02, height), bore, sections=12)
     else:
         base += rod(0, 0, (floor - 0.004, height), radius, sections=14)
@@ -40,7 +40,7 @@ def standing(draws: Draws) -> Assembly:
     if slides:
         parent = lamp.add("pole", pole, prismatic("base", UP, 0.0, travel, (0, 0, sleeve)))
     rim = draws.length("shade_radius", (0.08, 0.19)) * (1.0 if small else 1.4)
-    tall = rim * draws.number("shade_height", (0.8, 1.9))
+    tall = draws.length("shade_height", (0.8, 1.9), of=rim)
     kind = draws.pick("shade", {"cone": 0.4, "drum": 0.25, "square": 0.15, "ball": 0.2})
     tilts = draws.chance("shade_tilts", 0.3)
     low = height + (0.035 if tilts else GAP)
@@ -67,21 +67,21 @@ def standing(draws: Draws) -> Assembly:
 def _foot(draws: Draws, kind: str, wide: float, thick: float, height: float, radius: float) -> tuple[Solid, float]:
     """Solid, and the height at which the pole begins."""
     if kind == "disc":
-        return rod(0, 0, (0, thick), wide, draws.number("foot_taper", (0.8, 1.0)) * wide, 36), thick
+        return rod(0, 0, (0, thick), wide, draws.length("foot_top_radius", (0.8, 1.0), of=wide), 36), thick
     if kind == "square":
-        return box(wide, wide, (0, thick), fillet=draws.number("foot_corner", (0.05, 0.5)) * wide, axis=2), thick
+        return box(wide, wide, (0, thick), fillet=draws.length("foot_corner", (0.05, 0.5), of=wide), axis=2), thick
     if kind == "legs":
-        head = draws.number("leg_height", (0.25, 0.75)) * height
-        span = min(draws.number("leg_spread", (0.25, 0.5)) * height + 0.06, 0.4)
+        head = draws.length("leg_height", (0.25, 0.75), of=height)
+        span = min(draws.length("leg_spread", (0.25, 0.5), of=height) + 0.06, 0.4)
         size = draws.length("leg_radius", (0.006, 0.014))
         legs = union(
             tube([(span * cos(a), span * sin(a), size), (0.5 * radius * cos(a), 0.5 * radius * sin(a), head)], size, 10)
             for a in turns(3, 0.5)
         )
         return legs + rod(0, 0, (head - 0.02, head + 0.02), 1.8 * radius + size, sections=16), head
-    top = draws.number("vase_height", (0.6, 0.85)) * height
+    top = draws.length("vase_height", (0.6, 0.85), of=height)
     shares = np.linspace(0.0, 1.0, 8)
-    belly, waist = draws.number("vase_radius", (0.5, 1.0)) * wide, draws.number("vase_waist", (0.2, 0.5)) * wide
+    belly, waist = draws.length("vase_radius", (0.5, 1.0), of=wide), draws.length("vase_waist", (0.2, 0.5), of=wide)
     bulge = power(sin(np.pi * (0.15 + 0.85 * shares)), draws.number("vase_bulge", (0.7, 2.5)))
     radii = waist + (belly - waist) * bulge
     radii[-1] = max(1.3 * radius, 0.3 * waist)
@@ -94,9 +94,9 @@ def _shade(draws: Draws, kind: str, rim: float, tall: float, low: float) -> Soli
     if kind == "ball":
         return ellipsoid((0, 0, low + 0.8 * rim), (rim, rim, 0.8 * rim), 24)
     sections = 4 if kind == "square" else 24
-    neck = rim * draws.number("shade_neck", (0.3, 0.75) if kind == "cone" else (0.85, 1.0))
+    neck = draws.length("neck_radius", (0.3, 0.75) if kind == "cone" else (0.85, 1.0), of=rim)
     wall = 0.0025
-    holder = low + draws.number("holder_height", (0.02, 0.25)) * tall
+    holder = low + draws.length("holder_height", (0.02, 0.25), of=tall)
     shell = vessel([(rim, low), (neck, low + tall)], wall, (0.0, 0.0, 0.0), sections, floor=False)
     width = (rim + (neck - rim) * (holder - low) / tall) * cos(np.pi / sections)
     spokes = box(width - 0.002, 0.003, (holder, holder + 0.004))
@@ -130,7 +130,7 @@ def spotlight(draws: Draws) -> Assembly:
     reach = float(hypot(radius, 0.6 * long)) + 0.012
     mount = draws.pick("mount", ["disc", "pole", "legs"])
     high = draws.length("height", (0.01, 0.04) if mount == "disc" else (0.1, 1.1))
-    wide = radius * draws.number("foot_width", (1.0, 1.8))
+    wide = draws.length("foot_radius", (1.0, 1.8), of=radius)
     base = rod(0, 0, (0, min(high, 0.02)), wide, 0.9 * wide, 32)
     if mount == "legs":
         base, _ = _foot(draws, "legs", wide, 0.02, high, 0.012)
@@ -146,8 +146,8 @@ def spotlight(draws: Draws) -> Assembly:
         yoke += hull_of(box(0.012, (a, b), (low, low + thick)), rod(0, (a, b), center[2], 0.012, sections=14))
     lamp.add("yoke", yoke, continuous("base", UP, (0, 0, high)))
     # The front of the head looks to -X.
-    rim = radius * draws.number("front_width", (0.75, 1.0))
-    back = radius * draws.number("back_width", (0.3, 0.95))
+    rim = draws.length("front_radius", (0.75, 1.0), of=radius)
+    back = draws.length("back_radius", (0.3, 0.95), of=radius)
     start, end = np.array([-0.55 * long, 0, center[2]]), np.array([0.45 * long, 0, center[2]])
     head = cylinder(start, center, 0.97 * rim, 0.97 * radius, 24) + cylinder(center, end, 0.97 * radius, back, 24)
     head += ring(start, (1, 0, 0), 0.8 * rim, rim, 0.012, 24)

@@ -26,7 +26,7 @@ def build(draws: Draws) -> Assembly:
     upright = kind == "rocker" and count > 1 and draws.chance("stacked", 0.2)
     depth = draws.length("depth", (0.007, 0.022), (0.006, 0.032), tails=0.15)
     height = draws.length("height", (0.065, 0.15))
-    border = height * draws.number("border", (0.08, 0.2))
+    border = draws.length("border", (0.08, 0.2), of=height)
     pitches = draws.length("rocker_width", (0.022, 0.045)), draws.length("toggle_spacing", (0.036, 0.046))
     pitch = {"rocker": pitches[0], "toggle": pitches[1], "dimmer": 0.06}[kind]
     width = max(count * pitch + 2 * border, 0.06 if upright else 0.07)
@@ -108,7 +108,7 @@ def _plate(draws: Draws, width: float, height: float, depth: float, screws: bool
     """The back, a rounded rim, and screws by chance."""
     half = 0.5 * np.array([width, height])
     rim = 0.0065
-    edge = depth * draws.number("rim_depth", (0.7, 1.0))
+    edge = draws.length("rim_depth", (0.7, 1.0), of=depth)
     solid = box((-0.0025, *(-half + 0.002)), (0, *(half - 0.002)))
     for axis in (0, 1):
         for side in (-1, 1):
@@ -155,5 +155,5 @@ def _dimmer(draws: Draws, depth: float, radius: float) -> Solid:
     """A round knob with a pointer."""
     r, tall = min(radius, draws.length("knob_radius", (0.012, 0.02))), draws.length("knob_height", (0.009, 0.016))
     x = -depth - GAP
-    solid = rod((x, x - tall), 0, 0, r, draws.number("knob_taper", (0.8, 0.98)) * r, 32)
+    solid = rod((x, x - tall), 0, 0, r, draws.length("knob_top_radius", (0.8, 0.98), of=r), 32)
     return solid + box((x - tall - 0.0008, x - 0.5 * tall), 0.0012, (0.2 * r, 0.75 * r))

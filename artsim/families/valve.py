@@ -23,7 +23,7 @@ def build(draws: Draws) -> Assembly:
     pipe = draws.length("pipe_radius", (0.02, 0.05))
     count = draws.pick("valves", {1: 0.7, 2: 0.2, 3: 0.1})
     lever = draws.chance("lever", 0.3)
-    spacing = pipe * draws.number("spacing", (5.5, 7.5))
+    spacing = draws.length("spacing", (5.5, 7.5), of=pipe)
     room = 0.47 * spacing if count > 1 else np.inf
     half = 0.5 * count * spacing * (1.0 if count > 1 else draws.number("pipe_length", (0.55, 0.9)))
     valve = Assembly("body", tube([(0, -half, 0), (0, half, 0)], pipe, 24) + _ends(draws, half, pipe), IRON)
@@ -47,8 +47,8 @@ def _ends(draws: Draws, half: float, pipe: float) -> Solid:
     """Flanges with bolts, or threaded collars with six sides, at both ends of the pipe."""
     solid = Solid()
     flanged, bolts = draws.chance("flanges", 0.65), draws.pick("flange_bolts", [4, 6, 8])
-    thick = pipe * draws.number("flange_thickness", (0.25, 0.4))
-    wide = pipe * draws.number("flange_radius", (1.6, FLANGE))
+    thick = draws.length("flange_thickness", (0.25, 0.4), of=pipe)
+    wide = draws.length("flange_radius", (1.6, FLANGE), of=pipe)
     for side in (-1.0, 1.0):
         end = np.array([0.0, side * half, 0.0])
         inward = np.array([0.0, -side, 0.0])
@@ -65,35 +65,35 @@ def _ends(draws: Draws, half: float, pipe: float) -> Solid:
 
 def _gate_valve(draws: Draws, pipe: float, room: float) -> tuple[Solid, Solid, float, float]:
     """Body and bonnet; the handwheel with its stem; the height where they join; how far the wheel rises."""
-    belly = pipe * draws.number("body_radius", (1.15, 1.45))
-    solid = ellipsoid((0, 0, 0), (belly, 1.25 * belly, belly * draws.number("body_height", (1.0, 1.3))), 20)
-    neck = pipe * draws.number("neck_radius", (0.7, 0.95))
-    seat = belly * draws.number("neck_height", (1.2, 1.7))
+    belly = draws.length("body_radius", (1.15, 1.45), of=pipe)
+    solid = ellipsoid((0, 0, 0), (belly, 1.25 * belly, draws.length("body_height", (1.0, 1.3), of=belly)), 20)
+    neck = draws.length("neck_radius", (0.7, 0.95), of=pipe)
+    seat = draws.length("neck_height", (1.2, 1.7), of=belly)
     solid += rod(0, 0, (0, seat), neck)
-    wide = neck * draws.number("bonnet_radius", (1.35, 1.6))
-    thick = pipe * draws.number("bonnet_thickness", (0.2, 0.3))
+    wide = draws.length("bonnet_radius", (1.35, 1.6), of=neck)
+    thick = draws.length("bonnet_thickness", (0.2, 0.3), of=pipe)
     solid += rod(0, 0, (seat - thick, seat + thick), wide, sections=24)
     for spot in circle((0, 0, seat), UP, 0.5 * (wide + neck), draws.pick("bonnet_bolts", [4, 6])):
         solid += cylinder(spot - (0, 0, 1.4 * thick), spot + (0, 0, 1.5 * thick), 0.13 * pipe, sections=6)
-    stem = pipe * draws.number("stem_radius", (0.16, 0.24))
-    travel = pipe * draws.number("wheel_travel", (0.6, 1.4))
+    stem = draws.length("stem_radius", (0.16, 0.24), of=pipe)
+    travel = draws.length("wheel_travel", (0.6, 1.4), of=pipe)
     gland = max(2.2 * stem, 0.45 * neck)
     bottom = seat + 0.5 * thick
-    top = bottom + travel + pipe * draws.number("gland_height", (0.3, 0.7))
+    top = bottom + travel + draws.length("gland_height", (0.3, 0.7), of=pipe)
     bore = stem + GAP
     solid += ring((0, 0, 0.5 * (bottom + top)), UP, bore, gland, top - bottom, 12)
     if draws.chance("gland_nut", 0.5):
         solid += ring((0, 0, top - 0.12 * pipe), UP, bore, 1.35 * gland, 0.24 * pipe, 6)
     hub = top + GAP
     if draws.chance("yoke", 0.4):  # it carries a nut for the stem
-        hub = top + travel * draws.number("yoke_height", (0.3, 0.8)) + 0.3 * pipe
+        hub = top + draws.length("yoke_height", (0.3, 0.8), of=travel) + 0.3 * pipe
         leg = 0.14 * pipe
         reach = 0.9 * wide - leg
         for side in (-1, 1):
             solid += tube([(0, side * reach, seat), (0, side * reach, hub - 0.35 * pipe), (0, side * (bore + 1.6 * leg),
                            hub - 0.15 * pipe - GAP)], leg, 10)  # fmt: skip
         solid += ring((0, 0, hub - GAP - 0.15 * pipe), UP, bore, bore + 2.5 * leg, 0.3 * pipe, 12)
-    radius = min(pipe * draws.number("wheel_radius", (1.5, 2.4)), room)
+    radius = min(draws.length("wheel_radius", (1.5, 2.4), of=pipe), room)
     wheel = _wheel(draws, hub, radius, stem, pipe)
     wheel += rod(0, 0, (bottom + 0.2 * pipe, hub + 0.3 * pipe), stem, sections=16)
     return solid, wheel, hub, travel
@@ -101,9 +101,9 @@ def _gate_valve(draws: Draws, pipe: float, room: float) -> tuple[Solid, Solid, f
 
 def _wheel(draws: Draws, hub: float, radius: float, stem: float, pipe: float) -> Solid:
     """Handwheel: a rim, spokes (dished by chance) and a hub with a nut."""
-    rim = radius * draws.number("rim_radius", (0.07, 0.12))
+    rim = draws.length("rim_radius", (0.07, 0.12), of=radius)
     spokes = draws.integer("spokes", 3, 6)
-    level = hub + rim + radius * draws.number("wheel_dish", (0.0, 0.25))
+    level = hub + rim + draws.length("wheel_dish", (0.0, 0.25), of=radius)
     tall = 0.35 * pipe
     solid = tube(circle((0, 0, level), UP, radius - rim, 18), rim, 8, closed=True)
     solid += rod(0, 0, (hub, hub + tall), 2.0 * stem, 1.7 * stem, 16)
@@ -124,19 +124,19 @@ def _wheel(draws: Draws, hub: float, radius: float, stem: float, pipe: float) ->
 
 def _ball_valve(draws: Draws, pipe: float, room: float) -> tuple[Solid, Solid, float, float]:
     """Body and neck; the lever on its nut; the height where they join; 0, as it does not rise."""
-    belly = pipe * draws.number("body_radius", (1.25, 1.5))
+    belly = draws.length("body_radius", (1.25, 1.5), of=pipe)
     solid = ellipsoid((0, 0, 0), (belly, 1.2 * belly, belly), 18)
     sides = draws.pick("body_sides", [6, 8])
     for side in (-1, 1):
         solid += rod(0, (side * 0.5 * belly, side * 1.4 * belly), 0, 1.2 * pipe, sections=sides)
-    neck, top = 0.45 * pipe, belly + pipe * draws.number("neck_height", (0.25, 0.7))
+    neck, top = 0.45 * pipe, belly + draws.length("neck_height", (0.25, 0.7), of=pipe)
     solid += rod(0, 0, (0, top), neck, sections=18)
     z = top + GAP
-    thick, half = draws.length("lever_thickness", (0.003, 0.005)), pipe * draws.number("lever_width", (0.22, 0.35))
-    length = min(pipe * draws.number("lever_length", (2.8, 4.2)), 2.0 * room - 1.5 * neck)
-    rise = max(
-        pipe * draws.number("lever_rise", (0.2, 0.8)), FLANGE * pipe + thick + GAP - z
-    )  # open, the grip lies over a flange
+    thick = draws.length("lever_thickness", (0.003, 0.005))
+    half = 0.5 * draws.length("lever_width", (0.22, 0.35), of=2 * pipe)
+    length = min(draws.length("lever_length", (2.8, 4.2), of=pipe), 2.0 * room - 1.5 * neck)
+    # Open, the grip lies over a flange.
+    rise = max(draws.length("lever_rise", (0.2, 0.8), of=pipe), FLANGE * pipe + thick + GAP - z)
     # Shut, the lever stands across the pipe, towards the front.
     a = box(0.9 * neck, 1.1 * half, (z, z + thick), fillet=0.4 * thick)
     b = box((-0.35 * length, -0.35 * length + 0.008), half, (z + rise, z + rise + thick), fillet=0.4 * thick)

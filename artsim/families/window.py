@@ -41,7 +41,7 @@ def build(draws: Draws) -> Assembly:
     if kind == "sliding":
         count = max(count, 2)
     width = draws.length("width", (0.35, 1.0)) * (count if kind != "hung" else 1)  # drawn for one light
-    height = draws.length("height", (0.5, 1.8)) if kind != "hung" else width * draws.number("height", (1.3, 2.0))
+    height = draws.length("height", (0.5, 1.8)) if kind != "hung" else draws.length("height", (1.3, 2.0), of=width)
     bar = draws.length("frame_width", (0.035, 0.065))
     depth = draws.length("depth", (0.05, 0.22))
     style = _Style(draws, 1.0 if kind == "hinged" else 0.035)
@@ -82,7 +82,7 @@ def _hinged(
     mullion = draws.length("mullion_width", (0.03, 0.06))
     top = height
     if draws.chance("top_light", 0.2) and height > 0.9:  # fixed
-        top = height * draws.number("top_light_sill", (0.68, 0.78))
+        top = draws.length("top_light_sill", (0.68, 0.78), of=height)
         window.body += box((x0, depth / 2), width / 2 + 0.001, (top, top + mullion))
         window.body += box(PANE / 2, width / 2 + 0.001, (top, height + 0.001)).called("glass", FRONT)
     meeting = count == 2 and draws.chance("sashes_meet", 0.45)
@@ -175,7 +175,7 @@ def _hung(draws: Draws, window: Assembly, width: float, height: float, depth: fl
     """A lower sash in front that slides up, and an upper one behind it that slides down or is fixed."""
     rail = style.rail
     both = draws.chance("both_slide", 0.6)
-    meet = height * draws.number("meeting_rail", (0.45, 0.55))
+    meet = draws.length("meeting_rail", (0.45, 0.55), of=height)
     solids = []
     for track, (first, last) in enumerate(((GAP, meet + rail / 2), (meet - rail / 2, height - GAP))):
         x = -depth / 2 + 0.006 + track * (style.thick + GAP)
