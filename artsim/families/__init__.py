@@ -114,7 +114,7 @@ DRAWS = 300
 """Draws at most until one meets the constraints: what one in a hundred has is found 19 times of 20."""
 _RESIZED = 4
 """Times that an object is planned again to have a length: each leaves a tenth or less of what was amiss."""
-_OVERALL = ("length", "scale")
+_OVERALL = ("length", "diameter", "scale")
 """Parameters that others are shares of."""
 
 
