@@ -3,8 +3,8 @@
 What varies: the kind, the outline of the case (round, square, polygon, arch, house, tambour), the rim, the marks of the
 hours, two or three hands of several forms and where they point, a pendulum and its bob, weights on chains, a door
 before the pendulum, doors of a cuckoo, a lid, bells with a hammer, knobs, a fork in which the case tilts. Two to eight
-parts move. Hands turn freely about the middle of the face, clockwise as seen from the front. The width is that of the
-face; most other lengths are drawn as shares of it.
+parts move. Hands turn freely about the middle of the face, clockwise as seen from the front. The diameter is that of
+the face; most other lengths are drawn as shares of it.
 """
 
 import numpy as np
@@ -30,7 +30,7 @@ def build(draws: Draws) -> Assembly:
 
 def _mantel_clock(draws: Draws) -> Assembly:
     """A case that stands: a block, an arch, a tambour, a house, or a drum on feet."""
-    radius = 0.5 * draws.length("width", (0.08, 0.2))
+    radius = 0.5 * draws.length("diameter", (0.08, 0.2))
     deep = draws.length("depth", (0.7, 1.5), of=radius)
     kind = draws.pick("case", ["block", "arch", "tambour", "house", "drum", "lancet"])
     half = 0.5 * draws.length("case_width", (1.12, 1.5), of=2 * radius)
@@ -100,7 +100,7 @@ def _knobs(draws: Draws, clock: Assembly, x: float, spread: float) -> None:
 
 def _longcase_clock(draws: Draws) -> Assembly:
     """A tall case on the floor: a hood with the face, a trunk with pendulum and weights, a plinth."""
-    radius = 0.5 * draws.length("width", (0.22, 0.34))
+    radius = 0.5 * draws.length("diameter", (0.22, 0.34))
     deep = draws.length("depth", (0.18, 0.28))
     hood = 0.5 * draws.length("hood_width", (1.15, 1.45), of=2 * radius)
     trunk = 0.5 * draws.length("trunk_width", (0.65, 0.95), of=2 * hood)
@@ -143,7 +143,7 @@ def _longcase_clock(draws: Draws) -> Assembly:
 
 def _alarm_clock(draws: Draws) -> Assembly:
     """A drum on feet with two bells, or a small case with a button."""
-    radius = 0.5 * draws.length("width", (0.05, 0.12))
+    radius = 0.5 * draws.length("diameter", (0.05, 0.12))
     deep = draws.length("depth", (0.6, 1.3), of=radius)
     half = 0.5 * draws.length("case_width", (1.08, 1.25), of=2 * radius)
     body = dial_plate(draws, radius)
@@ -212,7 +212,7 @@ def _twin_bell_clock(draws: Draws, body: Solid, radius: float, deep: float, half
 
 def _watch(draws: Draws) -> Assembly:
     """A pocket watch that stands upright: a flat drum with a crown, a bow, and by chance a lid."""
-    radius = 0.5 * draws.length("width", (0.032, 0.056))
+    radius = 0.5 * draws.length("diameter", (0.032, 0.056))
     deep = draws.length("depth", (0.25, 0.55), of=radius)
     half = 0.5 * draws.length("case_width", (1.06, 1.18), of=2 * radius)
     rise = 0.16 * radius

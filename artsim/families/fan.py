@@ -27,7 +27,7 @@ def build(draws: Draws) -> Assembly:
 def _head_fan(draws: Draws) -> Assembly:
     """A head with a cage on a neck, on a table stand or a tall column."""
     standing = draws.chance("standing", 0.5)
-    cage = 0.5 * draws.length("width", (0.34, 0.5) if standing else (0.26, 0.4))
+    cage = 0.5 * draws.length("diameter", (0.34, 0.5) if standing else (0.26, 0.4))
     column = draws.length("column_radius", (0.08, 0.12), of=cage)
     height = draws.length("height", (0.7, 1.1)) if standing else draws.length("height", (1.15, 1.5), of=cage)
     sliding = standing and draws.chance("telescopic", 0.6)
@@ -151,7 +151,7 @@ def _blades(draws: Draws, cage: float, depth: float) -> Solid:
 
 def _box_fan(draws: Draws) -> Assembly:
     """Blades in a square frame, with a knob by chance."""
-    cage = 0.5 * draws.length("width", (0.28, 0.52))
+    cage = 0.5 * draws.length("diameter", (0.28, 0.52))
     half = 0.5 * draws.length("depth", (0.22, 0.32), of=2 * cage)
     wall, outer = 0.014, 1.06 * cage + 0.014
     base = frame((-half, -outer, -outer), (half, outer, outer), [wall] * 4)
@@ -187,7 +187,7 @@ def _box_fan(draws: Draws) -> Assembly:
 
 def _ceiling_fan(draws: Draws) -> Assembly:
     """Long paddles under a ceiling at z = 0, by chance with a lamp below."""
-    reach, drop = 0.5 * draws.length("width", (0.9, 1.5)), draws.length("drop", (0.12, 0.4))
+    reach, drop = 0.5 * draws.length("diameter", (0.9, 1.5)), draws.length("drop", (0.12, 0.4))
     count, body = draws.integer("blades", 3, 6), draws.length("motor_radius", (0.08, 0.13))
     mount = rod(0, 0, (-0.05, 0), 0.045, 0.07) + rod(0, 0, (-drop, -0.02), 0.013, sections=14)
     low = -drop - GAP

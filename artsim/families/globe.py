@@ -21,7 +21,7 @@ GAP = 0.0015
 
 def build(draws: Draws) -> Assembly:
     """A globe; its axis leans to one side, the front faces -X."""
-    radius = 0.5 * draws.length("width", (0.12, 0.4))  # of the sphere
+    radius = 0.5 * draws.length("diameter", (0.12, 0.4))  # of the sphere
     other = draws.degrees("tilt", (0.0, 40.0))
     lean = np.deg2rad({"earth": 23.4, "other": other}[draws.pick("axis", ["earth", "other"])])
     lean *= {"left": -1.0, "right": 1.0}[draws.pick("leans_to", ["left", "right"])]

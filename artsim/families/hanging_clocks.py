@@ -13,7 +13,7 @@ from artsim.making.solids import box, ellipsoid, frame, hull_of, prism, rod, tub
 
 def wall_clock(draws: Draws) -> Assembly:
     """A plain case, or a face with rays."""
-    radius = 0.5 * draws.length("width", (0.14, 0.5))
+    radius = 0.5 * draws.length("diameter", (0.14, 0.5))
     deep = draws.length("depth", (0.1, 0.5), of=radius)
     kind = draws.pick("case", ["round", "round", "square", "octagon", "dodecagon", "hexagon", "rays"])
     oblong = kind == "square" and not draws.chance("square", 0.5)
@@ -48,7 +48,7 @@ def wall_clock(draws: Draws) -> Assembly:
 
 def pendulum_clock(draws: Draws) -> Assembly:
     """A case on the wall with a box below, in which a pendulum hangs; or the pendulum hangs free."""
-    radius = 0.5 * draws.length("width", (0.12, 0.28))
+    radius = 0.5 * draws.length("diameter", (0.12, 0.28))
     deep = draws.length("depth", (0.05, 0.11))
     kind = draws.pick("case", ["round", "octagon", "square", "house", "arch"])
     half = 0.5 * draws.length("case_width", (1.1, 1.35), of=2 * radius)
@@ -88,7 +88,7 @@ def pendulum_clock(draws: Draws) -> Assembly:
 
 def cuckoo_clock(draws: Draws) -> Assembly:
     """A house with a steep roof, a small door for the bird, a leaf as a pendulum, and cones on chains."""
-    radius = 0.5 * draws.length("width", (0.07, 0.12))
+    radius = 0.5 * draws.length("diameter", (0.07, 0.12))
     deep, half = draws.length("depth", (0.06, 0.1)), 0.5 * draws.length("case_width", (1.4, 2.0), of=2 * radius)
     low = -draws.length("case_bottom", (1.25, 1.6), of=radius)
     eaves = draws.length("eaves_height", (1.6, 2.2), of=radius)

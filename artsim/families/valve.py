@@ -20,7 +20,7 @@ FLANGE = 1.9
 
 def build(draws: Draws) -> Assembly:
     """Valves on a pipe along Y, with their stems up or towards the front; all are shut at rest."""
-    pipe = draws.length("pipe_radius", (0.02, 0.05))
+    pipe = 0.5 * draws.length("diameter", (0.04, 0.1))
     count = draws.pick("valves", {1: 0.7, 2: 0.2, 3: 0.1})
     lever = draws.chance("lever", 0.3)
     spacing = draws.length("spacing", (5.5, 7.5), of=pipe)
