@@ -83,15 +83,13 @@ def build(draws: Draws) -> Assembly:
     return switch
 
 
-def _cells(inner: Array, count: int, axis: int, bar: float) -> list[Array]:
-    """(2, 2) corners in y and z of every cell of a row."""
+def _cells(inner: Array, count: int, axis: int, bar: float) -> Array:
+    """(N, 2, 2) corners in y and z of every cell of a row."""
     edges = np.linspace(inner[0, axis], inner[1, axis], count + 1)
-    cells = []
-    for k in range(count):
-        cell = inner.copy()
-        cell[0, axis] = edges[k] + (bar / 2 if k else 0.0)
-        cell[1, axis] = edges[k + 1] - (bar / 2 if k < count - 1 else 0.0)
-        cells.append(cell)
+    cells = np.tile(inner, (count, 1, 1))
+    cells[:, 0, axis], cells[:, 1, axis] = edges[:-1], edges[1:]
+    cells[1:, 0, axis] += bar / 2
+    cells[:-1, 1, axis] -= bar / 2
     return cells
 
 
