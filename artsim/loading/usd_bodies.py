@@ -154,7 +154,7 @@ class StageReader:
         for prim in self.prims:
             kind = str(prim.GetTypeName())
             if kind not in KINDS:
-                if kind in _UNREAD:
+                if kind in _UNREAD and self._is_shown(prim):
                     skipped.add(kind)
                 continue
             count += 1

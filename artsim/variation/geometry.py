@@ -8,7 +8,7 @@ import numpy as np
 from manifold3d import Manifold
 from numpy.typing import NDArray
 
-from artsim.model.details import detail_of
+from artsim.model.details import detail_of, on_faces
 from artsim.model.joints import Joint, Mimic
 from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import UNKNOWN_DYNAMICS, ArticulatedObject, Body, Mesh, Part
@@ -193,11 +193,13 @@ def _mapped(part: Part, surface: Callable[[Mesh], Mesh], pieces: Callable[[Body]
     details = []
     for detail in part.details:
         own, kept = tuple(pieces(Body(detail.pieces, 0.0))), detail.faces
-        if kept is not None:
-            moved = surface((part.vertices, part.faces[kept]))
-            own_points = moved[0][moved[1]].reshape(-1, 3)
-            kept = kept if len(faces) == len(part.faces) else np.zeros(0, dtype=np.int64)
-        points = own_points if kept is not None else np.concatenate([corners for corners, _ in own])
+        if kept is None:
+            points = np.concatenate([corners for corners, _ in own])
+        else:  # faces may be cut in several
+            moved, its = surface((part.vertices, part.faces[kept]))
+            points = moved[its].reshape(-1, 3)
+            slack = 1e-9 * float(np.ptp(vertices, axis=0).max())
+            kept = np.flatnonzero(on_faces(vertices[faces].mean(axis=1), moved, its, slack))
         outward = detail.T_rest_detail[:3, 0]
         details.append(detail_of(detail.label, points, vertices, outward, own, kept))
     return replace(part, vertices=vertices, faces=faces, body=body, details=tuple(details))
