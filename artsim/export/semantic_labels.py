@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from artsim.model.appearance import Material
 from artsim.model.details import on_faces
 from artsim.model.robot import Link, Robot
 
@@ -46,7 +45,7 @@ def part_item(label: str) -> str | None:
     return next((PARTS[word] for word in reversed(label.split("_")) if word in PARTS), None)
 
 
-def add_labels(stage: Any, robot: Robot, paths: Sequence[Any], materials: Mapping[Any, Material]) -> None:
+def add_labels(stage: Any, robot: Robot, paths: Sequence[Any], substances: Mapping[Any, str]) -> None:
     """Labels of the whole, of each link, and of each material.
 
     Parameters
@@ -55,8 +54,8 @@ def add_labels(stage: Any, robot: Robot, paths: Sequence[Any], materials: Mappin
     robot : Robot
     paths : sequence of pxr.Sdf.Path
         Of the links.
-    materials : mapping
-        Materials by the path of their prim.
+    substances : mapping
+        Of materials, by the path of their prim.
     """
     category = robot.obj.category or "object"
     _label(stage.GetDefaultPrim(), "class", category)
@@ -68,8 +67,8 @@ def add_labels(stage: Any, robot: Robot, paths: Sequence[Any], materials: Mappin
             if (item := part_item(word)) is not None:
                 _label(stage.GetPrimAtPath(path), "wikidata_qcode", item)
         _label_details(stage, robot, link, path)
-    for path, material in materials.items():
-        _label(stage.GetPrimAtPath(path), "material", material.substance or UNKNOWN_SUBSTANCE)
+    for path, substance in substances.items():
+        _label(stage.GetPrimAtPath(path), "material", substance or UNKNOWN_SUBSTANCE)
 
 
 def _label_details(stage: Any, robot: Robot, link: Link, path: Any) -> None:

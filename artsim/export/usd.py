@@ -11,7 +11,6 @@ from artsim.common.names import unused_name
 from artsim.export.looks import NO_FINISH, Finish, Look
 from artsim.export.options import ExportOptions
 from artsim.export.semantic_labels import add_labels
-from artsim.model.appearance import Material
 from artsim.model.details import GRIPS
 from artsim.model.kinematics import Array
 from artsim.model.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
@@ -58,8 +57,8 @@ def usd_stage(
     paths = [root.GetPath().AppendChild(link.name) for link in robot.links]
     for link, path in zip(robot.links, paths, strict=True):
         _add_link(stage, path, link)
-    _add_friction(stage, root.GetPath(), robot)
-    materials = _add_finish(stage, root.GetPath(), robot, finish, pictures)
+    substances = {_add_friction(stage, root.GetPath(), robot): ""}
+    substances |= _add_finish(stage, root.GetPath(), robot, finish, pictures)
     free = options.base == "free"
     UsdPhysics.ArticulationRootAPI.Apply(stage.GetPrimAtPath(paths[0]) if free else root.GetPrim())
     if not free:
@@ -84,12 +83,12 @@ def usd_stage(
             if slides[source] == slides[joint.name]:
                 _add_mimic(prim, scope.AppendChild(source), slides[source], multiplier, offset)
     if labelled:
-        add_labels(stage, robot, paths, materials)
+        add_labels(stage, robot, paths, substances)
     return stage
 
 
 def _add_link(stage: Any, path: Any, link: Link) -> None:
-    from pxr import Gf, UsdGeom, UsdPhysics
+    from pxr import Gf, UsdGeom, UsdPhysics, Vt
 
     xform = UsdGeom.Xform.Define(stage, path)
     xform.AddTranslateOp().Set(Gf.Vec3d(*link.origin.tolist()))
@@ -109,11 +108,12 @@ def _add_link(stage: Any, path: Any, link: Link) -> None:
         if detail.label in GRIPS:  # in the middle of the handle, from where a gripper comes
             line = UsdGeom.BasisCurves.Define(stage, path.AppendChild(f"grasp_identifier_{detail.name}"))
             ends = np.stack([T[:3, 3] + (0.5 * detail.size[0] + APPROACH) * T[:3, 0], T[:3, 3]])
-            line.CreatePointsAttr([tuple(end) for end in ends.tolist()])
-            line.CreateExtentAttr([tuple(ends.min(axis=0).tolist()), tuple(ends.max(axis=0).tolist())])
+            points = Vt.Vec3fArray.FromNumpy(ends.astype(np.float32))
+            line.CreatePointsAttr(points)
+            line.CreateWidthsAttr([0.002])
+            line.CreateExtentAttr(UsdGeom.Curves.ComputeExtent(points, line.GetWidthsAttr().Get()))
             line.CreateCurveVertexCountsAttr([2])
             line.CreateTypeAttr(UsdGeom.Tokens.linear)
-            line.CreateWidthsAttr([0.002])
             line.SetWidthsInterpolation(UsdGeom.Tokens.constant)
             line.CreatePurposeAttr(UsdGeom.Tokens.guide)
     for i, shape in enumerate(link.collision):
@@ -138,8 +138,8 @@ def _add_link(stage: Any, path: Any, link: Link) -> None:
             collider.CreatePurposeAttr(UsdGeom.Tokens.guide)
 
 
-def _add_friction(stage: Any, root: Any, robot: Robot) -> None:
-    """One physics material for all that collides."""
+def _add_friction(stage: Any, root: Any, robot: Robot) -> Any:
+    """One physics material for all that collides; its path."""
     from pxr import UsdPhysics, UsdShade
 
     path = root.AppendChild(unused_name("surface", {link.name for link in robot.links}))
@@ -151,6 +151,7 @@ def _add_friction(stage: Any, root: Any, robot: Robot) -> None:
     for prim in stage.Traverse():
         if prim.HasAPI(UsdPhysics.CollisionAPI):
             UsdShade.MaterialBindingAPI.Apply(prim).Bind(material, UsdShade.Tokens.weakerThanDescendants, "physics")
+    return path
 
 
 def _is_same(shape: BoxShape | MeshShape, other: BoxShape | MeshShape) -> bool:
@@ -161,8 +162,8 @@ def _is_same(shape: BoxShape | MeshShape, other: BoxShape | MeshShape) -> bool:
     return np.array_equal(first, second)
 
 
-def _add_finish(stage: Any, root: Any, robot: Robot, finish: Finish, pictures: str) -> dict[Any, Material]:
-    """Materials, and meshes with places on textures, each face in the subset of its material; materials by path."""
+def _add_finish(stage: Any, root: Any, robot: Robot, finish: Finish, pictures: str) -> dict[Any, str]:
+    """Materials, and meshes with places on textures, each face in the subset of its material; substances by path."""
     from pxr import Sdf, UsdGeom, UsdShade, Vt
 
     if not finish.materials:
@@ -214,7 +215,7 @@ def _add_finish(stage: Any, root: Any, robot: Robot, finish: Finish, pictures: s
             subset = binding.CreateMaterialBindSubset(look.material, faces)
             material = UsdShade.Material(stage.GetPrimAtPath(scope.AppendChild(look.material)))
             UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
-    return {scope.AppendChild(name): material for name, material in finish.materials.items()}
+    return {scope.AppendChild(name): material.substance for name, material in finish.materials.items()}
 
 
 def _joined(link: Link, looks: Sequence[Look]) -> MeshShape:
