@@ -22,6 +22,7 @@ from artperl.commands.resumed_lines import line_name
 from artsim.common.outputs import check_output, output_file, write_output
 from artsim.common.progress import track
 from artsim.errors import ConfigError
+from artsim.export.folders import new_folder
 
 if TYPE_CHECKING:
     from artperl.methods.protocol import Method
@@ -103,6 +104,10 @@ class Estimate(EstimateOptions):
             raise ConfigError("a cluster has its own processes", "workers, ray", "leave one of them out")
         if several and self.view is not None:
             raise ConfigError("a page shows one object", "view", "give one file, or leave it out")
+        if several and (self.urdf or self.mjcf or self.usd):
+            raise ConfigError(
+                "an object is written of one cloud", "urdf, mjcf, usd", "give one file, or leave them out"
+            )
 
     def _estimate_one(self, file: Path, estimator: Method) -> None:
         from artperl.evaluation.estimate_page import page
@@ -113,6 +118,11 @@ class Estimate(EstimateOptions):
             print(f"note: {text}", file=sys.stderr)
         result = estimator(cloud.points)
         record = record_of(result, cloud)
+        folders = {"urdf": self.urdf, "mjcf": self.mjcf, "usd": self.usd}
+        for folder in dict.fromkeys(folder for folder in folders.values() if folder is not None):
+            formats = [kind for kind, given in folders.items() if given == folder]
+            with new_folder(folder) as part:
+                result.export(part, formats, result.reference.partition(":")[0] or self.category, file.stem)
         if self.view is not None:
             write_output(self.view, page(result, cloud.points, f"{file.name}: {self.category}").encode())
         if self.out == STDOUT:

@@ -29,6 +29,13 @@ class EstimateOptions:
     several files: .jsonl, a line each; rerun the command to resume."""
     view: Path | None = None
     """Write a page for a browser here: the cloud by part, boxes, joint axes, and the way to them."""
+    urdf: Path | None = None
+    """Write the estimate as an object of boxes and joints into this folder, as URDF; its pose and states are in
+    meta.json."""
+    mjcf: Path | None = None
+    """The same as MJCF, for MuJoCo; it may be the same folder."""
+    usd: Path | None = None
+    """The same as USD."""
     unit: Literal["m", "mm", "cm"] | None = None
     """Unit of the numbers in the file. By default m, and mm for depth images of whole numbers."""
     camera: Literal["opencv", "opengl"] = "opencv"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -131,6 +133,25 @@ class Estimate(Showable):
         """Unit of each part's state and limits, length K: "rad", "m", or "" for what does not move."""
         units = {"free": "", "fixed": "", "prismatic": "m"}
         return tuple(units.get(kind, "rad") for kind in self.joint_type)
+
+    def export(
+        self, folder: str | Path, formats: Sequence[str] = ("urdf",), category: str = "object", name: str = "estimate"
+    ) -> dict[str, Any]:
+        """Write the estimate as an articulated object that simulators load; see :func:`artsim.export.export`.
+
+        ``meta.json`` has ``T_camera_object`` and the joint states ``q``, in the order of its parts.
+
+        Raises
+        ------
+        ConfigError
+            When a format is unknown, or a box has no size.
+        """
+        from artperl.core.estimated_object import estimated_object
+        from artsim.export import export
+
+        obj, T, q = estimated_object(self, category, name)
+        estimated = {"T_camera_object": T.tolist(), "q": q.tolist(), "confidence": self.confidence}
+        return export(obj, folder, formats, notes={"estimate": estimated})
 
     def __str__(self) -> str:
         rows = [HEAD, *cells(self)[:_MOST_PARTS]]

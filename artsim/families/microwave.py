@@ -137,12 +137,12 @@ def _controls(draws: Draws, low: Array, high: Array, opener: bool) -> tuple[Soli
     if opener:
         keys = [0.12 * size[long], 0.75 * size[short]]
         movers.append(("button_1", push_button(at(-0.39), keys if short == 2 else keys[::-1], 0.003), at(-0.39)))
-    if draws.chance("dials", 0.5):
+    if draws.chance("dial_controls", 0.5):
         radius = min(0.36 * size[short], 0.1 * size[long], 0.03)
         radius *= draws.number("dial_radius", (0.9, 1.0), (0.55, 1.0))
         reach = draws.length("dial_reach", (0.012, 0.022), (0.004, 0.022))
         lower = 0.0 if opener else draws.number("dials_lower", (0.0, 0.12))
-        for number, along in enumerate((0.15 - lower, -0.15 - lower)[: draws.integer("dial_count", 1, 2)], 1):
+        for number, along in enumerate((0.15 - lower, -0.15 - lower)[: draws.integer("dials", 1, 2)], 1):
             movers.append((f"dial_{number}", dial(at(along), (-1, 0, 0), reach, radius), at(along)))
         return fixed, movers
     rows, columns = draws.integer("key_rows", 3, 5), draws.integer("key_columns", 2, 3)

@@ -1,0 +1,122 @@
+"""An estimate as an articulated object: a box for each part, with openings for what lies inside, joints and limits."""
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from artperl.core.estimate import Estimate, points_at_rest
+from artsim.common.products import apply, matmul
+from artsim.errors import ConfigError
+from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.solids import box, union
+from artsim.model.kinematics import Array
+from artsim.model.objects import ArticulatedObject
+from artsim.model.transforms import compose_transform
+
+_GAP = 0.004
+"""Diagonals between a part and what lies in its openings; and the thinnest wall that is left."""
+_DENSITY = 300.0
+"""kg/m^3 of what is known as a box alone: furniture and appliances, hollow, have about as much."""
+
+
+def estimated_object(estimate: Estimate, category: str = "object", name: str = "estimate") -> tuple[
+    ArticulatedObject, Array, Array
+]:  # fmt: skip
+    """The object that an estimate describes, where it is, and its joint states.
+
+    A part is its box, less the boxes of later parts that reach into it: a cabinet has an opening for each drawer. A
+    screw, of whose thread an estimate knows nothing, becomes a hinge.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    category, name : str
+
+    Returns
+    -------
+    obj : ArticulatedObject
+        As :func:`artsim.export.export` takes it; at rest at 0.
+    T_camera_object : (4, 4) float
+    q : (K,) float
+        States, cut to the limits.
+
+    Raises
+    ------
+    ConfigError
+        When a box has no size.
+    """
+    T = np.asarray(estimate.T_camera_part, dtype=np.float64)
+    if not (np.isfinite(estimate.size).all() and (estimate.size > 0).all()):
+        raise ConfigError("a box of the estimate has no size", name, "give a cloud that shows the object")
+    center = points_at_rest(estimate.translation, T)
+    axes = apply(np.swapaxes(T[:, :3, :3], 1, 2), estimate.joint_axis)
+    origins = points_at_rest(estimate.joint_origin, T)
+    low, high = center - 0.5 * estimate.size, center + 0.5 * estimate.size
+    gap = _GAP * float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))
+    names = _names(estimate)
+    made, q = Assembly(density=_DENSITY), np.zeros(len(T))
+    filled: list[tuple[Array, Array]] = []
+    for k, part in enumerate(names):
+        inside = [(low[j] - gap, high[j] + gap) for j in range(k + 1, len(names))]
+        own = boxes_without(low[k], high[k], inside, gap)
+        joint = None
+        if k > 0:
+            joint, q[k] = _joint(estimate, k, names[int(estimate.joint_parent[k])], axes[k], origins[k])
+        made.add(part, union(box(start, end) for start, end in own), joint, label=re.sub(r"_[0-9]+$", "", part))
+        filled += own
+    ends = np.array(filled)
+    middle = 0.5 * (ends[:, 0].min(axis=0) + ends[:, 1].max(axis=0))
+    return made.build(category, name), matmul(T[0], compose_transform(middle)), q
+
+
+def boxes_without(
+    low: Array, high: Array, others: Sequence[tuple[Array, Array]], least: float
+) -> list[tuple[Array, Array]]:
+    """Boxes that fill a box (low, high) less others; slivers thinner than ``least`` are left out.
+
+    The whole box, where the others leave nothing of it.
+    """
+    left = [(low, high)]
+    for a, b in others:
+        parts = []
+        for one, two in left:
+            if (a >= two).any() or (b <= one).any():
+                parts.append((one, two))
+                continue
+            one, two = one.copy(), two.copy()
+            for axis in range(3):
+                for beyond, at in ((a[axis] - one[axis], a[axis]), (two[axis] - b[axis], b[axis])):
+                    if beyond > least:
+                        start, end = one.copy(), two.copy()
+                        if at == a[axis]:
+                            end[axis] = one[axis] = at
+                        else:
+                            start[axis] = two[axis] = at
+                        parts.append((start, end))
+        left = parts
+    return left or [(low, high)]
+
+
+def _joint(estimate: Estimate, k: int, parent: str, axis: Array, origin: Array) -> tuple[JointSpec, float]:
+    """The joint of part k, and its state within the limits."""
+    kind, state = estimate.joint_type[k], float(estimate.state[k])
+    lower, upper = (float(end) for end in estimate.joint_limits[k]) if len(estimate.joint_limits) else (-np.inf, np.inf)
+    if kind == "prismatic":
+        lower, upper = (lower, upper) if np.isfinite([lower, upper]).all() else (min(state, 0.0), max(state, 0.0))
+        return prismatic(parent, axis, lower, upper, origin), float(np.clip(state, lower, upper))
+    if kind in ("fixed", "free"):
+        return revolute(parent, (0, 0, 1), origin, 0.0, 0.0), 0.0
+    if not np.isfinite([lower, upper]).all():
+        return continuous(parent, axis, origin), state
+    return revolute(parent, axis, origin, lower, upper), float(np.clip(state, lower, upper))
+
+
+def _names(estimate: Estimate) -> list[str]:
+    """A proper name for each part, the same ones numbered."""
+    names: list[str] = []
+    for k in range(len(estimate.joint_type)):
+        given = estimate.part_names[k] if k < len(estimate.part_names) else "part"
+        name = re.sub(r"\W", "_", given) if re.match(r"[A-Za-z_]", given) else f"part_{given}"
+        names.append(name if name not in names and list(estimate.part_names).count(given) == 1 else f"{name}_{k}")
+    return names
