@@ -19,7 +19,7 @@ class _Case:
     """Measures of a cutter, metres: its handle from x = ``front`` to ``end``, the channel and slot of its blade."""
 
     def __init__(self, draws: Draws) -> None:
-        self.length = length = draws.length("length", (0.07, 0.3))
+        self.length = length = draws.log_length("length", 0.145, -0.73, 0.73)
         self.half = 0.5 * length * draws.number("width", (0.075, 0.45))
         self.height = max(min(2 * self.half * draws.number("height", (0.2, 1.0)), 0.26 * length), 0.009)
         if draws.chance("slim", 0.15):  # of sheet steel

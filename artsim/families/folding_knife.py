@@ -20,7 +20,7 @@ RING = 16
 
 def build(draws: Draws) -> Assembly:
     """A knife, folded at rest. Blades turn about vertical pins at the ends of the handle."""
-    length = draws.length("length", (0.06, 0.26))
+    length = draws.log_length("length", 0.125, -0.733, 0.733)
     stout = draws.chance("stout", 0.1, upper=True)
     half = 0.5 * length * draws.number("width", (0.42, 0.54) if stout else (0.11, 0.42))
     many = draws.chance("pocket_knife", 0.4)
@@ -51,6 +51,7 @@ def build(draws: Draws) -> Assembly:
     pins = np.column_stack([ends, [float(np.interp(x, outline[0, :, 0], outline.mean(axis=0)[:, 1])) for x in ends]])
     knife = Assembly("handle", handle + _details(draws, outline, pins, thick + scale), 1600.0)
 
+    span = ends[1] - ends[0]
     edge = min(float(piece[:, 1].min()) for piece in back) - pins[0, 1] - 2 * GAP
     open_to = draws.degrees("blade_angle", (165.0, 180.0))
     number = 0
@@ -58,7 +59,8 @@ def build(draws: Draws) -> Assembly:
         z = low + k * pitch + GAP
         pair = many and draws.chance("pair", 0.5)
         for side in (-1, 1) if pair else (-1,):
-            room = (ends[1] - ends[0]) * (0.48 if pair else 1.0) + (0.0 if pair else 0.5 * half)
+            # Of a pair, the upper corner of each point stays before the middle while the blade turns.
+            room = np.sqrt(0.23 * span**2 - edge**2) if pair else span + 0.5 * half
             kind = "blade" if number == 0 or draws.chance("second_blade", 0.5) else "tool"
             back_edge = -half * draws.number("blade_width", (0.7, 1.05))
             long = room * draws.number("blade_length", (0.88, 1.0))

@@ -49,7 +49,7 @@ class _Section:
 
 def build(draws: Draws) -> Assembly:
     """A pen; its long axis is upright. Half of those with a cap stand on their end."""
-    length = draws.length("length", (0.08, 0.2))
+    length = draws.log_length("length", 0.127, -0.6, 0.5)
     slim = draws.chance("slim", 0.3)
     radius = length * draws.number("width", (0.02, 0.045) if slim else (0.045, 0.14))
     kind = draws.pick("kind", {"cap": 0.42, "button": 0.27, "twist": 0.13, "sliders": 0.09, "double": 0.09})
