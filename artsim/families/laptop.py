@@ -22,7 +22,10 @@ class _Shape:
     """Main measures. The lid reaches from x = ``front`` to ``back``; the base starts at ``base_front``."""
 
     def __init__(self, draws: Draws) -> None:
-        self.width = width = draws.length("width", (0.18, 0.48))
+        # A generator of its own, so that laptops of usual sizes do not depend on the others.
+        size = draws.fork("", draws.rng.spawn(1)[0]).pick("format", {"usual": 0.88, "palmtop": 0.06, "huge": 0.06})
+        widths = {"usual": (0.18, 0.48), "palmtop": (0.13, 0.18), "huge": (0.48, 0.56)}[size]
+        self.width = width = draws.length("width", widths)
         if draws.chance("usual", 0.4):
             self.depth = draws.triangular("depth", 0.54, 0.67, 0.9, of=width, unit="m")
             self.height = max(draws.triangular("height", 0.012, 0.035, 0.11, of=width, unit="m"), 0.006)  # of the base
