@@ -13,10 +13,11 @@ from importlib import import_module
 import numpy as np
 
 from artsim.errors import ConfigError
-from artsim.families.constraints import AXES, LENGTHS, Constraints, Given, measured_length
+from artsim.families.constraints import Constraints, Given
 from artsim.families.physical import with_physics
+from artsim.families.searching import Search
 from artsim.making.assembly import Assembly
-from artsim.making.draws import Draw, Draws, UnmetError, key_of, ranges, values_of
+from artsim.making.draws import Draws, Wanted, ranges, values_of
 from artsim.model.objects import ArticulatedObject
 from artsim.model.params import Params
 
@@ -112,10 +113,6 @@ PARTNET_MOBILITY: dict[str, tuple[str, ...]] = {
 
 DRAWS = 300
 """Draws at most until one meets the constraints: what one in a hundred has is found 19 times of 20."""
-_RESIZED = 4
-"""Times that an object is planned again to have a length: each leaves a tenth or less of what was amiss."""
-_OVERALL = ("length", "diameter", "scale")
-"""Parameters that others are shares of."""
 
 
 def make(category: str | Params, seed: int = 0, **constraints: Given) -> ArticulatedObject:
@@ -165,51 +162,20 @@ def make(category: str | Params, seed: int = 0, **constraints: Given) -> Articul
 def make_constrained(category: str, seed: int, constraints: Constraints) -> ArticulatedObject:
     """The object that :func:`make` makes under constraints; see there."""
     _check(category, seed)
-    reached: list[Assembly] = []
-    seen: list[Mapping[str, Draw]] = []
+
+    def plan(draw: int, wanted: Mapping[str, Wanted]) -> tuple[Assembly, Draws]:
+        draws = Draws(_generator(category, seed, draw), wanted)
+        return FAMILIES[category](draws), draws
+
+    search = Search(plan, constraints)
     for draw in range(DRAWS):
-        draws = Draws(_generator(category, seed, draw), constraints.of_draws)
-        try:
-            made, unmet = FAMILIES[category](draws), constraints.unmet_by
-            missing = unmet(made, draws.drawn)
-            if missing and set(missing) <= set(LENGTHS):
-                made, draws, missing = _resized(category, seed, draw, constraints, made, draws)
-        except UnmetError as problem:
-            seen.append({key_of(problem.name): problem.draw})
-            continue
-        if not missing:
+        found = search.at(draw)
+        if found is not None:
+            made, draws = found
             params = Params(category, seed, draw, values_of(draws.drawn))
             source = source_name(category, seed, constraints)
             return replace(with_physics(made.build(category, str(seed))), source=source, params=params)
-        reached.append(made)
-        seen.append({key_of(name): draw for name, draw in draws.drawn.items()})
-    raise constraints.refusal(category, reached, {n: d for n, d in ranges(seen).items() if n in constraints.of_draws})
-
-
-def _resized(
-    category: str, seed: int, draw: int, constraints: Constraints, made: Assembly, draws: Draws
-) -> tuple[Assembly, Draws, list[str]]:
-    """The same draw with other lengths among its parameters, so that its box at rest has the ones that are asked for.
-
-    The parameter of a length's name is scaled, or else one that others are shares of; and all three for the size.
-    """
-    asked = {name: wanted for name, wanted in constraints.wanted if name in LENGTHS and isinstance(wanted, tuple)}
-    lengths: dict[str, float] = {}
-    for _ in range(_RESIZED):
-        missing = constraints.unmet_by(made, draws.drawn)
-        for name in missing if set(missing) <= set(LENGTHS) else ():
-            low, high = asked[name]
-            if high > 1.04 * low:  # a length at the very end of a range may lie beyond it once it is rounded
-                low, high = 1.02 * low, 0.98 * high
-            now = measured_length(made, name)
-            for side in AXES if name == "size" else (name,):
-                scaled = [draw for draw in (side, *_OVERALL) if draw in draws.drawn][:1]
-                lengths |= {d: float(draws.drawn[d].value) * min(max(now, low), high) / now for d in scaled}
-        if not missing or not lengths:
-            break
-        draws = Draws(_generator(category, seed, draw), {**constraints.of_draws, **lengths})
-        made = FAMILIES[category](draws)
-    return made, draws, constraints.unmet_by(made, draws.drawn)
+    raise constraints.refusal(category, search.reached, ranges(search.seen))
 
 
 def _made_again(params: Params, seed: int, constraints: Mapping[str, Given]) -> ArticulatedObject:

@@ -7,7 +7,8 @@ from collections import Counter
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, draws_of
 from artsim.families.constraints import FEATURES, LENGTHS, described, measured, measured_length
-from artsim.making.draws import ranges
+from artsim.making.assembly import Assembly
+from artsim.making.draws import Draws, ranges
 
 
 def parameters(category: str) -> str:
@@ -34,10 +35,7 @@ def describe_family(category: str, count: int = 20) -> str:
     if count < 1:
         raise ConfigError(f"{count} is not a count", "objects", "use 1 or more")
     text = parameters(category)
-    traces, made = [], []
-    for seed in range(count):
-        traces.append(draws_of(category, seed))
-        made.append(FAMILIES[category](traces[-1]))
+    traces, made = seen_of(category, count)
     types = Counter(kind for assembly in made for kind in set(assembly.joint_types[1:]))
     kinds = sorted({label for assembly in made for label in assembly.labels[1:]})
     moving = [f"{kind} {_range([assembly.labels[1:].count(kind) for assembly in made])}" for kind in kinds]
@@ -57,6 +55,12 @@ def describe_family(category: str, count: int = 20) -> str:
     return "\n".join([category, *(f"  {line}".rstrip() for line in text.splitlines()), "",
                       f"  of {count} objects:", *_rows(lines), "",
                       f"  parameters, as {count} objects draw them:", *_rows(named), ""])  # fmt: skip
+
+
+def seen_of(category: str, count: int) -> tuple[list[Draws], list[Assembly]]:
+    """Draws and plans of the first objects of a category."""
+    traces = [draws_of(category, seed) for seed in range(count)]
+    return traces, [FAMILIES[category](draws) for draws in traces]
 
 
 def _rows(pairs: list[tuple[str, str]]) -> list[str]:

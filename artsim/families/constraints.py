@@ -88,6 +88,10 @@ class Constraints:
         """What is asked of draws by their names."""
         return {name: value for name, value in self.wanted if name not in NAMES}
 
+    def without(self, names: Collection[str]) -> Constraints:
+        """All but some."""
+        return Constraints(tuple((name, wanted) for name, wanted in self.wanted if name not in names))
+
     def unmet_by(self, made: Assembly, drawn: Mapping[str, Draw]) -> list[str]:
         """Names of those that an object does not meet, whose draws are in ``drawn``."""
         parameters = {key_of(name) for name in drawn}
@@ -160,13 +164,14 @@ def described(draw: Draw) -> str:
 def _met(made: Assembly, name: str, wanted: Wanted, drawn: bool) -> bool:
     """Whether an object meets a constraint; a parameter that is ``drawn`` has the value that is asked for."""
     if name in NAMES:
-        return _meets(measured(made, name), name, wanted)
+        return meets(measured(made, name), name, wanted)
     if drawn and (not isinstance(wanted, tuple) or count_parts(made, name) == 0):
         return True
-    return isinstance(wanted, tuple) and _meets(measured(made, name), name, wanted)
+    return isinstance(wanted, tuple) and meets(measured(made, name), name, wanted)
 
 
-def _meets(value: float | bool | frozenset[str], name: str, wanted: Wanted) -> bool:
+def meets(value: float | bool | frozenset[str], name: str, wanted: Wanted) -> bool:
+    """Whether a value is what is asked for."""
     if isinstance(wanted, tuple):
         assert not isinstance(value, frozenset)
         slack = TOLERANCE if name in LENGTHS and wanted[0] == wanted[1] else 0.0
