@@ -22,7 +22,8 @@ class Vary(Packages):
     """
 
     path: tyro.conf.Positional[Path]
-    """URDF, MJCF, USD, GLB or joint file, or its folder."""
+    """URDF, MJCF, USD, GLB or joint file, or its folder; or a procedural object: its name, such as laptop:3, or the
+    params.json that comes with its files. Without --others, it is made of other parameters."""
     out: Path
     """Folder to write to; made if missing."""
     count: int = 10
@@ -31,6 +32,10 @@ class Vary(Packages):
     """Seed of the first variation; the others count up from it."""
     others: tuple[Path, ...] = ()
     """Objects of the same category, or folders of them: parts of theirs may take the place of the object's."""
+    strength: float | None = None
+    """How far parameters of a procedural object move, as a share of their ranges; 0.3 by default."""
+    towards: Path | None = None
+    """Procedural object of the same category: write those on the way to it, in equal steps."""
     formats: tuple[Literal["urdf", "mjcf", "usd", "usdz", "simready"], ...] = ("urdf",)
     """File formats: mobility.urdf, mobility.xml, mobility.usda, mobility.usdz, and in the folder simready a package for
     NVIDIA's profile Robotics-Prop."""
@@ -40,8 +45,9 @@ class Vary(Packages):
 
         with resumable("whole variations are kept", self.out):
             summary = write_variations(
-                self.path, self.out, self.count, self.seed, self.others, self.formats, self.package_root
-            )
+                self.path, self.out, self.count, self.seed, self.others, self.formats, self.package_root,
+                strength=self.strength, towards=self.towards,
+            )  # fmt: skip
         print_some(summary.failed)
         print(f"{summary.folder}: {len(summary.notes)} variations of {self.path}\n{summary}")
         if not summary.notes:

@@ -27,6 +27,8 @@ DEFAULTS = ExportOptions()
 FORMATS = {"urdf": "mobility.urdf", "mjcf": "mobility.xml", "usd": "mobility.usda", "usdz": "mobility.usdz",
            "simready": "simready"}  # fmt: skip
 """File written in each format; of SimReady, the folder that holds its package."""
+PARAMS_FILE = "params.json"
+"""Parameters of a procedural object: ``artsim.load`` makes it again."""
 
 
 def export(
@@ -38,8 +40,8 @@ def export(
 ) -> dict[str, Any]:
     """Write an object into a folder.
 
-    ``meta.json`` and, for URDF and MJCF, ``meshes/*.obj`` are shared by all formats; URDF comes with
-    ``semantics.txt``. The bytes depend on the object and the formats alone.
+    ``meta.json``, the ``params.json`` of procedural objects and, for URDF and MJCF, ``meshes/*.obj`` are shared by all
+    formats; URDF comes with ``semantics.txt``. The bytes depend on the object and the formats alone.
 
     Parameters
     ----------
@@ -99,6 +101,8 @@ def export(
         write_simready(robot, folder, options, finish if options.materials else draw_finish(robot))
     meta = {**describe(robot, formats), **(notes or {})}
     meta["artsim"] |= asdict(options)
+    if obj.params is not None:
+        (folder / PARAMS_FILE).write_text(obj.params.to_json() + "\n")
     (folder / "meta.json").write_text(json.dumps(meta, indent=1) + "\n")
     return meta
 

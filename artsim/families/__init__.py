@@ -19,7 +19,7 @@ from artsim.families.searching import Search
 from artsim.making.assembly import Assembly
 from artsim.making.draws import Draws, Wanted, ranges, values_of
 from artsim.model.objects import ArticulatedObject
-from artsim.model.params import Params
+from artsim.model.params import Params, Value
 
 Family = Callable[[Draws], Assembly]
 
@@ -181,18 +181,41 @@ def make_constrained(category: str, seed: int, constraints: Constraints) -> Arti
 def _made_again(params: Params, seed: int, constraints: Mapping[str, Given]) -> ArticulatedObject:
     if seed or constraints:
         raise ConfigError("parameters say all of an object", "artsim.make", "change them: params.having(width=0.5)")
-    _check(params.category, params.seed)
+    _check(params.category, params.seed, params.draw)
     draws = Draws(_generator(params.category, params.seed, params.draw), params.values, lenient=True)
     made = FAMILIES[params.category](draws).build(params.category, str(params.seed))
     source = f"parameters of {params.category}:{params.seed}"
     return replace(with_physics(made), source=source, params=replace(params, values=values_of(draws.drawn)))
 
 
-def _check(category: str, seed: int) -> None:
+def varied(params: Params, rng: np.random.Generator, strength: float) -> Params:
+    """Parameters near others: numbers move by ``strength`` of their ranges or so, choices change as seldom."""
+    draws = Draws(_generator(params.category, params.seed, params.draw), params.values, lenient=True)
+    FAMILIES[params.category](draws)
+    values: dict[str, Value] = {}
+    for name, draw in draws.drawn.items():
+        value, far, other = draw.value, strength * float(rng.standard_normal()), rng.random() < _OTHER * strength
+        if draw.kind == "number":
+            value = min(max(float(value) + far * (draw.high - draw.low), draw.low), draw.high)
+        elif draw.kind == "choice" and other:
+            value = draw.options[rng.integers(len(draw.options))]
+        elif draw.kind == "yes or no" and other:
+            value = not value
+        elif draw.kind in ("integer", "seed") and other:
+            value = int(rng.integers(draw.low, draw.high + 1))
+        values[name] = value
+    return replace(params, values=values)
+
+
+_OTHER = 0.3
+"""Chance that a choice, a count or a seed of details is drawn again, at strength 1."""
+
+
+def _check(category: str, seed: int, draw: int = 0) -> None:
     if category not in FAMILIES:
         raise ConfigError(f"there is no category {category!r}", fix=f"use one of {', '.join(sorted(FAMILIES))}")
-    if seed < 0:
-        raise ConfigError(f"seed {seed} is negative", fix="use 0 or more")
+    if min(seed, draw) < 0:
+        raise ConfigError(f"seed {min(seed, draw)} is negative", fix="use 0 or more")
 
 
 def assembly_of(category: str, seed: int) -> Assembly:

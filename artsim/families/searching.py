@@ -8,8 +8,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from itertools import islice
 
-import numpy as np
-
 from artsim.common.elementary import exp, log
 from artsim.families.constraints import AXES, LENGTHS, Constraints, measured, measured_length, meets
 from artsim.making.assembly import Assembly
@@ -27,6 +25,8 @@ _LARGEST, _PART = 2, 0.2
 """Parameters without a fitting name that are tried, the longest of all; and the least share of a length that one is."""
 _VAIN = 3
 """Draws in which a parameter changes nothing until it is left alone."""
+_NOWHERE, _WIDE = 2, 4
+"""Draws in which an option leads nowhere until others are preferred; one draw of so many has all."""
 _NEAR = 0.03
 """What is left of a length's logarithm for the next step."""
 
@@ -47,19 +47,45 @@ class Search:
         self.seen: list[Mapping[str, Draw]] = []
         """Their draws, and those that what is asked for lies outside of."""
         self._vain: Counter[tuple[str, str]] = Counter()
-        self._steep: dict[tuple[str, tuple[str, ...]], float] = {}
+        self._choices: dict[str, Draw] = {}
+        self._led_nowhere: Counter[tuple[str, Value]] = Counter()
 
     def at(self, draw: int) -> Found | None:
         """The plan of a draw that meets the constraints, if it comes to that."""
-        try:
-            made, draws = self.plan(draw, self.constraints.of_draws)
-        except UnmetError as problem:
-            self.seen.append({key_of(problem.name): problem.draw})
+        planned = self._planned(draw)
+        if planned is None:
             return None
+        made, draws = planned
         self.reached.append(made)
         self.seen.append({key_of(name): one for name, one in draws.drawn.items()})
         changed = self._changed(draw, made, draws)
-        return None if changed is None else self._resized(draw, *changed)
+        found = None if changed is None else self._resized(draw, *changed)
+        for name, one in draws.drawn.items():
+            if one.options or (one.kind == "yes or no" and 0.0 < one.high < 1.0):
+                self._choices[name] = one
+                self._led_nowhere[name, one.value] += 1
+        return found
+
+    def _planned(self, draw: int) -> Found | None:
+        asked = self.constraints.of_draws
+        others = {} if draw % _WIDE == 0 else self._others()
+        for wanted in ({**others, **asked}, asked) if others else (asked,):
+            try:
+                return self.plan(draw, wanted)
+            except UnmetError as problem:
+                if wanted is asked:
+                    self.seen.append({key_of(problem.name): problem.draw})
+        return None
+
+    def _others(self) -> dict[str, Wanted]:
+        """Of choices, the options that have not led nowhere so often, where there are some."""
+        others: dict[str, Wanted] = {}
+        for name, one in self._choices.items():
+            options = one.options or (True, False)
+            left = frozenset(option for option in options if self._led_nowhere[name, option] < _NOWHERE)
+            if 0 < len(left) < len(options):
+                others[name] = left if one.options else True in left
+        return others
 
     def _unmet(self, made: Assembly, draws: Draws) -> list[str]:
         """Lengths left out: they cost the most to know."""
@@ -108,17 +134,19 @@ class Search:
         """With other lengths among its parameters, so that its box at rest has those that are asked for."""
         wanted = [(n, ends) for n, ends in self.constraints.wanted if n in LENGTHS and isinstance(ends, tuple)]
         lengths: dict[str, Wanted] = {}
+        steep = dict.fromkeys(LENGTHS, 1.0)
         vain: set[str] = set()
-        steps: dict[str, tuple[float, tuple[str, ...], float]] = {}
+        steps: dict[str, tuple[float, list[str], float]] = {}
         for step in range(_RESIZED + 1):
             now = {name: measured_length(made, name) for name, _ in wanted}
-            for name, (before, moved, far) in steps.items():
-                steep = float(log(now[name] / before)) / far
-                if len(moved) == 1 and steep < 0.1:
+            for name, (before, moved, meant) in steps.items():
+                share = float(log(now[name] / before)) / meant
+                if len(moved) == 1 and steep[name] * share < 0.1:
                     vain.add(moved[0])
                     lengths.pop(moved[0], None)
                     self._vain[name, moved[0]] += 1
-                self._steep[name, moved] = min(max(steep, 0.3), 3.0)
+                    share = 1.0 / steep[name]
+                steep[name] = min(max(steep[name] * share, 0.3), 3.0)
             missing = [(name, ends) for name, ends in wanted if not meets(now[name], name, ends)]
             if not missing:
                 return made, draws
@@ -129,10 +157,10 @@ class Search:
                 if high > 1.04 * low:  # a length at the very end of a range may lie beyond it once it is rounded
                     low, high = 1.02 * low, 0.98 * high
                 far = float(log(min(max(now[name], low), high) / now[name]))
-                moved, gone = self._move(name, now[name], far, draws, lengths, vain)
+                moved, meant = self._move(name, now[name], far, steep[name], draws, lengths, vain)
                 if not moved:
                     return None
-                steps[name] = now[name], moved, gone
+                steps[name] = now[name], moved, meant
             try:
                 made, draws = self.plan(draw, {**asked, **lengths})
             except UnmetError:
@@ -142,32 +170,40 @@ class Search:
         return None
 
     def _move(
-        self, name: str, now: float, far: float, draws: Draws, lengths: dict[str, Wanted], vain: set[str]
-    ) -> tuple[tuple[str, ...], float]:
-        """Change ``lengths`` so that a length's logarithm moves by ``far``: which parameters, and by how much each.
+        self, name: str, now: float, far: float, steep: float, draws: Draws, lengths: dict[str, Wanted], vain: set[str]
+    ) -> tuple[list[str], float]:
+        """Change ``lengths`` so that a length's logarithm moves by ``far``: which parameters, and how far it comes.
 
-        None where their ranges end far before.
+        None where their ranges end long before. ``steep`` is what a parameter's logarithm does to the length's.
         """
         numbers = {n: (d, float(d.value)) for n, d in self._free(draws).items() if d.kind == "number" and d.low >= 0}
         long = [n for n, (d, value) in numbers.items() if d.unit == "m" and value > _PART * now]
         largest = sorted(long, key=lambda n: -numbers[n][1])[:_LARGEST]
-        moved: dict[str, float] = {}
+        moved: list[str] = []
         left: dict[str, float] = {}
         for side in AXES if name == "size" else (name,):
             left[side] = far
             for one in dict.fromkeys((side, *_OVERALL, *(n for n in long if n.endswith(f"_{side}")), *largest)):
                 if one in moved:  # by another side: it moves all
-                    left[side] = 0.0
-                if abs(left[side]) < _NEAR:
+                    left[side] = min(left.values(), key=abs)
+                if one in moved or abs(left[side]) < _NEAR:
                     break
-                if one not in numbers or one in vain or self._vain[name, one] >= _VAIN or numbers[one][1] <= 0:
+                d, value = numbers.get(one, (_NONE, 0.0))
+                if (
+                    value <= 0
+                    or (d.unit != "m" and one not in (side, "scale"))
+                    or one in vain
+                    or self._vain[name, one] >= _VAIN
+                ):
                     continue
-                (d, value), steep = numbers[one], self._steep.get((name, (one,)), 1.0)
                 new = min(max(value * float(exp(left[side] / steep)), d.low), d.high)
-                gone = float(log(new / value)) if new > 0 else 0.0
-                if abs(gone) > 1e-6:
-                    lengths[one], moved[one] = new, gone
-                    left[side] -= steep * gone
+                if new > 0 and abs(new / value - 1.0) > 1e-6:
+                    lengths[one] = new
+                    moved.append(one)
+                    left[side] -= steep * float(log(new / value))
         if not moved or min(map(abs, left.values())) > max(2.0 * _NEAR, 0.3 * abs(far) if name == "size" else 0.0):
-            return (), 0.0
-        return tuple(moved), float(np.mean(list(moved.values())))
+            return [], 0.0
+        return moved, far - sum(left.values()) / len(left)
+
+
+_NONE = Draw(0.0, "number")

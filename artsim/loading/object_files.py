@@ -105,6 +105,11 @@ def max_bytes(file: Path, limits: LoadLimits) -> int:
     return limits.max_mesh_bytes if file.suffix.lower() in SUFFIXES else limits.max_urdf_bytes
 
 
+def is_params(file: Path, data: bytes) -> bool:
+    """Whether a file holds parameters of a procedural object; see :class:`artsim.model.params.Params`."""
+    return file.suffix == ".json" and all(f'"{name}"'.encode() in data for name in ("category", "draw", "values"))
+
+
 def is_urdf(file: Path) -> bool:
     """Whether an object's file is URDF, and not of another format or an object file.
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from artsim.common.products import apply, matmul, norm, unit
 from artsim.errors import AssetError
+from artsim.families import make
 from artsim.loading.bodies import (
     RigidBody,
     axis_in_base,
@@ -26,16 +27,18 @@ from artsim.loading.details import named_faces, with_details
 from artsim.loading.documents import read_document
 from artsim.loading.mesh_files.surface import is_thin
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, check_range, merge_shapes
-from artsim.loading.object_files import category_of_folder, find_urdf, max_bytes, object_id, read_urdf
+from artsim.loading.object_files import category_of_folder, find_urdf, is_params, max_bytes, object_id, read_urdf
 from artsim.loading.packages import MissingFileError
 from artsim.loading.partnet import read_side_files
 from artsim.loading.rest_frame import rest_rotation
 from artsim.loading.rest_state import canonical_category, rest_state
+from artsim.loading.sources import FamilySource
 from artsim.loading.urdf_document import Shape, UrdfJoint, UrdfLink, UrdfRobot
 from artsim.model.joints import Joint, Mimic
 from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.object_file import load_object
 from artsim.model.objects import ArticulatedObject, Part, Repair, content_sha256
+from artsim.model.params import Params
 from artsim.model.transforms import compose_transform, transform_points
 
 _FAR = 20.0
@@ -55,7 +58,8 @@ def load(
     ----------
     path : str or Path
         A URDF, MJCF or USD file, a JSON file of joints (of PartNet-Mobility or Shape2Motion), the glTF file beside one,
-        a folder that holds one of these, or an ``.npz`` object file out of a generated dataset.
+        a folder that holds one of these, an ``.npz`` object file out of a generated dataset, or a procedural object: a
+        JSON file of its parameters, or its name, such as ``laptop:3``.
     category : str, optional
         Category whose rest state and rest frame are wanted; by default what the side files say, else "unknown", for
         which both are as the file has them.
@@ -81,10 +85,14 @@ def load(
         When MuJoCo (MJCF) or usd-core (USD) is not installed.
     """
     limits = limits or LoadLimits()
+    if not Path(path).exists() and (made := FamilySource.named(str(path))) is not None:
+        return made.load()
     file = find_urdf(Path(path))
     if file.suffix == ".npz":
         return load_object(file)
     data = read_urdf(file, max_bytes(file, limits))
+    if is_params(file, data):
+        return make(Params.from_json(data.decode("utf-8", "replace"), str(file)))
     side = read_side_files(file)
     roots = _roots(package_roots or {})
     reader = MeshReader(file.parent, roots, limits)

@@ -82,13 +82,14 @@ class Params:
         try:
             found: Any = json.loads(text)
             values = found["values"]
-            if not all(isinstance(value, (float, int, str)) for value in values.values()):
-                raise TypeError("a value is no number, text, true or false")
+            if not all(isinstance(value, str) or abs(value) < _LARGEST for value in values.values()):
+                raise TypeError("a value is no finite number, text, true or false")
             seed, draw = (int(found[name]) for name in ("seed", "draw"))
             return Params(str(found["category"]), seed, draw, dict(values))
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
             raise ConfigError(f"no parameters of a procedural object ({error})", where, "use Params.to_json") from error
 
 
+_LARGEST = 1e300
 _COUNTS = 1000
 """Whole numbers below are counts; seeds are larger."""

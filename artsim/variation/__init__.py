@@ -10,7 +10,12 @@ from artsim.model.objects import ArticulatedObject
 __all__ = ["vary"]
 
 
-def vary(obj: ArticulatedObject, seed: int = 0, others: Sequence[ArticulatedObject] = ()) -> ArticulatedObject:
+def vary(
+    obj: ArticulatedObject,
+    seed: int = 0,
+    others: Sequence[ArticulatedObject] = (),
+    strength: float | None = None,
+) -> ArticulatedObject:
     """A variation of an object: the same for the same object, seed and others.
 
     Parameters
@@ -21,6 +26,8 @@ def vary(obj: ArticulatedObject, seed: int = 0, others: Sequence[ArticulatedObje
         Not negative.
     others : sequence of ArticulatedObject
         Of the same category: their parts may take the place of parts of the object.
+    strength : float, optional
+        Of a procedural object: make it of other parameters, so far from its own as a share of their ranges.
 
     Returns
     -------
@@ -38,4 +45,4 @@ def vary(obj: ArticulatedObject, seed: int = 0, others: Sequence[ArticulatedObje
     # Gates need the extra "sim", which "import artsim" does without.
     from artsim.variation.search import draw_variation
 
-    return draw_variation(obj, seed, others).obj
+    return draw_variation(obj, seed, others, strength=strength).obj

@@ -8,6 +8,7 @@ import hashlib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,8 @@ _FILE_GATES: dict[str, Callable[[Path, Mapping[str, Path] | None], list[str]]] =
     "inertia": lambda path, package_roots: strict_inertia(path),
 }
 """Gates of a file that stand besides those of the object that it describes."""
+_STRENGTH = 0.3
+"""Of variations of a procedural object, if nothing else is asked for."""
 
 
 @dataclass
@@ -70,7 +73,7 @@ class VariationSummary:
             ("passed at the first draw", f"{first} ({100 * first / max(1, len(draws)):.0f} %)"),
             ("draws", str(sum(draws))),
             *((f"rejected: {gate}", str(number)) for gate, number in sorted(rejected.items())),
-            *((f"operation: {name}", str(used[name])) for name in OPERATIONS if used[name]),
+            *((f"operation: {name}", str(used[name])) for name in (*OPERATIONS, "parameters", "between") if used[name]),
             ("different trees", str(len(self.trees))),
             ("different topologies", str(len({own["topology"] for own in self.notes}))),
             ("without a variation", str(len(self.failed))),
@@ -87,6 +90,8 @@ def write_variations(
     formats: Sequence[str] = ("urdf",),
     package_roots: Mapping[str, Path] | None = None,
     progress: bool = True,
+    strength: float | None = None,
+    towards: str | Path | None = None,
 ) -> VariationSummary:
     """Write variations of an object as files, or resume a run that was stopped.
 
@@ -108,6 +113,10 @@ def write_variations(
         As for :func:`artsim.load`.
     progress : bool
         Show progress.
+    strength : float, optional
+        Of a procedural object: vary its parameters, so far as a share of their ranges.
+    towards : path, optional
+        Of a procedural object: go in equal steps to this one of its category, which is not reached.
 
     Raises
     ------
@@ -125,6 +134,9 @@ def write_variations(
     obj, file_gates = load_with_bodies(path, package_roots)
     check_variable(obj, seed)
     donors = _load_others(obj, others, package_roots)
+    goal = None if towards is None else load(towards, package_roots=package_roots)
+    if obj.params is not None and goal is None and not donors:
+        strength = _STRENGTH if strength is None else strength
     standard = Standard.of(obj)
     folder = Path(out)
     summary = VariationSummary(folder, tuple(dict.fromkeys([*standard.gates, *file_gates])))
@@ -134,13 +146,17 @@ def write_variations(
         "sha256": obj.sha256,
         "others": hashlib.sha256(" ".join(donor.sha256 for donor in donors).encode()).hexdigest() if donors else "",
     }
+    if goal is not None or strength is not None:
+        origin |= {"strength": strength or 0.0, "towards": "" if goal is None else f"{goal.sha256} {count} {seed}"}
     with folder_lock(folder), track("variations", total=count, unit="object", shown=progress) as bar:
         remove_unfinished(folder)
         for number in range(seed, seed + count):
             notes = _whole(folder / str(number), origin, number, formats)
             if notes is None:
                 try:
-                    notes = _write(obj, folder, number, donors, standard, file_gates, formats, origin)
+                    between = None if goal is None else (goal, (number - seed + 1) / (count + 1))
+                    draw = partial(draw_variation, obj, number, donors, standard, strength, between)
+                    notes = _write(draw, folder, number, file_gates, formats, origin)
                     summary.made += 1
                 except AssetError as error:
                     summary.failed.append(str(error))
@@ -158,6 +174,8 @@ def load_with_bodies(
     Where the collision geometry or the inertia of the file fails its gate, parts have no body.
     """
     obj = load(path, package_roots=package_roots)
+    if obj.params is not None:
+        return obj, tuple(_FILE_GATES)
     file = find_urdf(Path(path))
     if not is_urdf(file):  # an object file has no bodies; other formats give them with the object
         return obj, ()
@@ -219,17 +237,15 @@ def _whole(folder: Path, origin: dict[str, Any], seed: int, formats: Sequence[st
 
 
 def _write(
-    obj: ArticulatedObject,
+    draw: Callable[[], Variation],
     out: Path,
     seed: int,
-    others: Sequence[ArticulatedObject],
-    standard: Standard,
     file_gates: Sequence[str],
     formats: Sequence[str],
     origin: dict[str, Any],
 ) -> dict[str, Any]:
     """Make a variation and write its folder; returns what its ``meta.json`` says of it."""
-    variation = draw_variation(obj, seed, others, standard)
+    variation = draw()
     notes = describe_variation(variation, origin, seed)
     with new_folder(out / str(seed)) as folder:
         write_variation(variation, folder, formats, notes)

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from artsim.errors import ArtsimError, AssetError, ConfigError
+from artsim.families import make, varied
 from artsim.model.objects import ArticulatedObject, content_sha256
+from artsim.model.params import Params
 from artsim.runs.recipe import check_seed
 from artsim.variation.geometry import centered
 from artsim.variation.operations import OPERATIONS
@@ -19,6 +21,8 @@ DRAWS = 12
 """Draws at most for one variation."""
 _GENTLER = 0.7
 """Strength of a draw over that of the one before."""
+_ASIDE = 0.02
+"""Standard deviation of the share of the second draw of an object in between."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +43,8 @@ def draw_variation(
     seed: int = 0,
     others: Sequence[ArticulatedObject] = (),
     standard: Standard | None = None,
+    strength: float | None = None,
+    towards: tuple[ArticulatedObject, float] | None = None,
 ) -> Variation:
     """A variation with its record; see :func:`artsim.vary`.
 
@@ -46,13 +52,21 @@ def draw_variation(
     ----------
     standard : Standard, optional
         That of the object, where it is known.
+    strength : float, optional
+        Of a procedural object: make it of parameters that are so far from its own, as a share of their ranges.
+    towards : (ArticulatedObject, float), optional
+        Of a procedural object: make it of parameters between its own and those of another one, at this share.
     """
     check_variable(obj, seed, others)
     standard = standard or Standard.of(obj)
     rejected: list[str] = []
     for draw in range(DRAWS):
         rng = np.random.default_rng([int(obj.sha256[:16], 16), seed, draw])
-        made, operations = _draw(obj, rng, _GENTLER**draw, others)
+        gentle = _GENTLER**draw
+        if strength is None and towards is None:
+            made, operations = _draw(obj, rng, gentle, others)
+        else:
+            made, operations = _by_parameters(obj, rng, (strength or 0.0) * gentle, towards, draw)
         if not operations:
             continue
         made = _named(made, obj, seed, operations)
@@ -95,10 +109,40 @@ def _draw(
     return obj, done
 
 
+def _by_parameters(
+    obj: ArticulatedObject,
+    rng: np.random.Generator,
+    strength: float,
+    towards: tuple[ArticulatedObject, float] | None,
+    draw: int,
+) -> tuple[ArticulatedObject, list[dict[str, Any]]]:
+    """The object of other parameters; a share that fails is drawn again, ever farther from where it was."""
+    params = of_parameters(obj)
+    if towards is not None:
+        share = float(np.clip(towards[1] + _ASIDE * draw * rng.standard_normal(), 0.0, 1.0))
+        params = params.between(of_parameters(towards[0]), share)
+    made = make(varied(params, rng, strength) if strength > 0 else params)
+    assert made.params is not None
+    old = of_parameters(obj).values
+    changed = {name: [old.get(name), value] for name, value in made.params.values.items() if old.get(name) != value}
+    return made, [{"operation": "parameters" if towards is None else "between", "values": changed}]
+
+
+def of_parameters(obj: ArticulatedObject) -> Params:
+    """Those of a procedural object; raises ConfigError of any other."""
+    if obj.params is None:
+        what = "only procedural objects have parameters"
+        raise ConfigError(what, f"{obj.category} {obj.object_id}", "name one, such as laptop:3 or its params.json")
+    return obj.params
+
+
 def _named(
     made: ArticulatedObject, original: ArticulatedObject, seed: int, operations: list[dict[str, Any]]
 ) -> ArticulatedObject:
     """The variation in a rest frame of its own, with a digest of what it came from."""
+    source = f"variation {seed} of {original.source}"
+    if made.params is not original.params:  # made by its family: its parameters say all of it
+        return replace(made, object_id=f"{original.object_id}_{seed}", source=source)
     made = centered(made)
     try:
         content = json.dumps(operations, sort_keys=True).encode()
@@ -110,6 +154,7 @@ def _named(
         sha256=content_sha256([original.sha256.encode(), content]),
         T_base_rest=np.eye(4),
         repairs=(),
-        source=f"variation {seed} of {original.source}",
+        source=source,
+        params=None,
         source_joints={joint.name: (k, 1.0) for k, joint in enumerate(made.native_tree.joints) if k > 0},
     )
