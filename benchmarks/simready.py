@@ -1,11 +1,13 @@
 """Are exported objects ready for simulators? ``python -m benchmarks.simready``.
 
 Objects of every category go through NVIDIA's ``simready-validate`` with the profile Robotics-Prop, as packages of
-``artsim export --formats simready``; a failed requirement of a feature that the profile needs is a failure. Then the
-same objects are read by MuJoCo (MJCF), Newton (USD) and SAPIEN (URDF), and what each says of limits, friction, effort,
-speed and masses is compared with the object. A dash: the format has no such value, or the simulator does not read it.
-SAPIEN's friction is a coefficient of its own and no effort; of a screw's turning joint, which URDF has as continuous,
-it reads no limits.
+``artsim export --formats simready``; a failed requirement of a feature that the profile needs is a failure. Of objects
+with handles, knobs or latches it counts those that pass the feature of grasps as well, which the profile does not need.
+The same packages go through all rules of the validator beneath, ``usd-validation-nvidia`` (Omniverse's asset
+validator); its warnings are counted apart. Then the same objects are read by MuJoCo (MJCF), Newton (USD) and SAPIEN
+(URDF), and what each says of limits, friction, damping, springs, effort, speed and masses is compared with the object.
+A dash: the format has no such value, or the simulator does not read it. SAPIEN's friction is a coefficient of its own
+and no effort; of a screw's turning joint, which URDF has as continuous, it reads no limits.
 
 Kitchens of ten objects in a row (``artsim scene --place row --simulate``) are run by MuJoCo on one core.
 """
@@ -25,13 +27,15 @@ from artsim import make
 from artsim.common.progress import say, track
 from artsim.export import FORMATS, export
 from artsim.families import FAMILIES
+from artsim.model.details import GRIPS
 from artsim.model.robot import Robot, as_robot
 from artsim.scenes.random_scene import SceneOptions, make_scene
 from artsim.scenes.simulation import write_simulation
 
 Values = dict[str, dict[str, float]]
 """By quantity, then by joint or link."""
-QUANTITIES = ("lower", "upper", "friction", "effort", "velocity", "mass")
+QUANTITIES = ("lower", "upper", "friction", "damping", "spring", "effort", "velocity", "mass")
+GRASPS = "FET_005_STANDARD"
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,8 @@ def in_mujoco(folder: Path) -> Values:
         "lower": {joint.name: joint.range[0] for joint in limited},
         "upper": {joint.name: joint.range[1] for joint in limited},
         "friction": {joint.name: model.dof_frictionloss[joint.dofadr[0]] for joint in joints},
+        "damping": {joint.name: model.dof_damping[joint.dofadr[0]] for joint in joints},
+        "spring": {joint.name: model.jnt_stiffness[joint.id] for joint in joints},
         "effort": {joint.name: model.jnt_actfrcrange[joint.id][1] for joint in joints},
         "mass": {model.body(b).name: model.body(b).mass[0] for b in range(1, model.nbody)},
     }
@@ -69,7 +75,8 @@ def in_newton(folder: Path) -> Values:
               if "/fixed_base" not in name]  # fmt: skip
     names = [(name.rsplit("/", 1)[-1], place) for name, place in moving]
     arrays = {"lower": read.joint_limit_lower, "upper": read.joint_limit_upper, "friction": read.joint_friction,
-              "effort": read.joint_effort_limit, "velocity": read.joint_velocity_limit}  # fmt: skip
+              "damping": read.joint_target_kd, "spring": read.joint_target_ke, "effort": read.joint_effort_limit,
+              "velocity": read.joint_velocity_limit}  # fmt: skip
     values = {quantity: {name: array[place] for name, place in names} for quantity, array in arrays.items()}
     bodies = (name.rsplit("/", 1)[-1] for name in read.body_label)
     return {**values, "mass": dict(zip(bodies, read.body_mass, strict=True))}
@@ -144,14 +151,19 @@ def main() -> None:
     """Entry point of ``python -m benchmarks.simready``."""
     options = tyro.cli(Options)
     import simready.validate as validator
+    import usd_validation_nvidia as rules
     import warp
 
     logging.getLogger().setLevel(logging.ERROR)  # the validator warns of its own code
     warp.config.quiet = True
     validator.initialize(rules_and_requirements_paths=[], features_paths=[], profiles_paths=[])
+    engine = rules.ValidationEngine(init_rules=False)
+    for rule in rules.CategoryRuleRegistry().rules:
+        if rule.__module__.startswith(rules.__name__):  # not those of SimReady's features, which are for profiles
+            engine.enable_rule(rule)
     keys = [(category, options.first_seed + n) for category in sorted(FAMILIES) for n in range(options.objects)]
     failed: Counter[str] = Counter()
-    passed, worst = 0, defaultdict[str, dict[str, float]](dict)
+    counts, issues, worst = Counter[str](), Counter[str](), defaultdict[str, dict[str, float]](dict)
     for category, seed in track("objects", keys, unit="object"):
         with tempfile.TemporaryDirectory() as place:
             folder, obj = Path(place), make(category, seed)
@@ -164,8 +176,14 @@ def main() -> None:
                 reason for said in found.features_summary.values() if said["blocking_failure"]
                 for reason in [str(said.get("failing requirements"))]
             }  # fmt: skip
-            passed += not reasons
+            counts["passed"] += not reasons
             failed.update(f"{category} {seed}: {reason}" for reason in reasons)
+            if any(detail.label in GRIPS for detail in obj.details):
+                counts["with grips"] += 1
+                counts["passed grasps"] += found.features_summary[GRASPS]["passed"]
+            lines = [f"{issue.severity.name} {issue.rule.__name__}" for issue in engine.validate(str(file)).issues()]
+            counts["passed rules"] += not any(line.startswith(("FAILURE", "ERROR")) for line in lines)
+            issues.update(lines)
             own = wanted(as_robot(obj))
             for name, read in READERS.items():
                 seen = read(folder)
@@ -173,17 +191,16 @@ def main() -> None:
                     worst[name][quantity] = max(worst[name].get(quantity, 0.0), value)
     for line in failed:
         say(line)
-    print(f"Robotics-Prop: {passed} of {len(keys)} pass")
+    print(f"Robotics-Prop: {counts['passed']} of {len(keys)} pass")
+    print(f"{GRASPS}: {counts['passed grasps']} of {counts['with grips']} with handles, knobs or latches pass")
+    print(f"{len(engine.rules)} rules of {rules.__name__}: {counts['passed rules']} pass; {dict(issues)}")
     print("| largest relative difference | " + " | ".join(QUANTITIES) + " |\n|---" + "|---" * len(QUANTITIES) + "|")
     for name, values in worst.items():
         cells = [f"{values[quantity]:.1e}" if quantity in values else "-" for quantity in QUANTITIES]
         print(f"| {name} | " + " | ".join(cells) + " |")
     kitchens = in_kitchens(options.kitchens)
-    print(
-        json.dumps(
-            {"kitchens": kitchens, "passed": passed, "objects": len(keys), "failed": list(failed), "differences": worst}
-        )
-    )
+    told = {"objects": len(keys), **counts, "failed": list(failed), "issues": issues, "differences": worst}
+    print(json.dumps({"kitchens": kitchens, **told}))
 
 
 if __name__ == "__main__":
