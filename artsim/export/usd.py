@@ -29,8 +29,9 @@ def usd_stage(
     One prim for each link, in metres, kilograms and degrees as UsdPhysics has it, Z up. A fixed base hangs on a fixed
     joint to the world, and the articulation root is the object's prim; the articulation root of a free one is its root
     link, to which Isaac Lab can add a fixed joint (``fix_root_link``). UsdPhysics has no velocity limits and no
-    friction: these are attributes of the schemas of PhysX and Newton. It knows no joints that follow others: such a
-    joint carries ``artsim:mimic:joint``, ``multiplier`` and ``offset`` (radians, metres) and, where it follows one of
+    friction: these are attributes of the schemas of PhysX and Newton. Springs are drives; that they are springs, and
+    latches, say ``artsim:spring``, ``hold`` and ``holdOver`` (radians, metres). UsdPhysics knows no joints that follow
+    others: such a joint carries ``artsim:mimic:joint``, ``multiplier`` and ``offset`` and, where it follows one of
     its own kind, Newton's and PhysX's mimic.
 
     Parameters
@@ -292,6 +293,9 @@ def _add_joint(stage: Any, path: Any, joint: LinkJoint, robot: Robot, paths: lis
     ):
         prim.AddAppliedSchema(schema_name)
         prim.CreateAttribute(name, Sdf.ValueTypeNames.Float).Set(value)
+    for name, value in (("spring", joint.spring), ("hold", joint.hold), ("holdOver", joint.hold_over)):
+        if value:
+            prim.CreateAttribute(f"artsim:{name}", Sdf.ValueTypeNames.Double).Set(value)
 
 
 def _add_mimic(prim: Any, source: Any, slides: bool, multiplier: float, offset: float) -> None:

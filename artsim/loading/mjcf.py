@@ -205,10 +205,12 @@ class _ModelReader:
 
     def _dynamics(self, j: int) -> JointDynamics:
         model, dof = self._model, int(self._model.jnt_dofadr[j])
+        q, spring = int(model.jnt_qposadr[j]), float(np.ravel(model.jnt_stiffness[j])[0])
         return JointDynamics(
             effort=float(np.abs(model.jnt_actfrcrange[j]).max()) if model.jnt_actfrclimited[j] else None,
             damping=float(np.ravel(model.dof_damping[dof])[0]),
             friction=float(model.dof_frictionloss[dof]),
+            spring=spring if spring and model.qpos_spring[q] == model.qpos0[q] else None,
         )
 
     def _inertia(self, b: int) -> Inertia | None:

@@ -63,23 +63,24 @@ def read_inertia(
 def read_dynamics(prim: Any, axis: str, meters: float, kilograms: float) -> JointDynamics:
     """What a joint's drive and PhysX's attributes say of one of its axes; parameters as of :func:`read_inertia`.
 
-    The axis is called linear or angular, or in a generic joint ``transX`` and so on. A drive without stiffness damps;
-    with one, its damping belongs to a controller.
+    The axis is called linear or angular, or in a generic joint ``transX`` and so on. A drive without stiffness damps,
+    and so does one that is a spring, as artsim writes them; with other stiffness, its damping belongs to a controller.
     """
     from pxr import UsdPhysics
 
     slides = axis.startswith(("linear", "trans"))
     speed = meters if slides else np.pi / 180.0
     force = kilograms * meters * (1.0 if slides else meters)
+    spring, hold, over = (_finite(prim.GetAttribute(f"artsim:{name}"), 1.0) for name in ("spring", "hold", "holdOver"))
     effort = damping = None
     drive = UsdPhysics.DriveAPI.Get(prim, axis)
     if drive and prim.HasAPI(UsdPhysics.DriveAPI, axis):
         effort = _finite(drive.GetMaxForceAttr(), force)
-        if not number(drive.GetStiffnessAttr(), 0.0):
+        if spring or not number(drive.GetStiffnessAttr(), 0.0):
             damping = _finite(drive.GetDampingAttr(), force / speed)
     friction = _finite(prim.GetAttribute(f"physxJointAxis:{axis}:staticFrictionEffort"), force)
     velocity = _finite(prim.GetAttribute("physxJoint:maxJointVelocity"), speed)
-    return JointDynamics(effort, velocity, damping, friction)
+    return JointDynamics(effort, velocity, damping, friction, spring=spring, hold=hold, hold_over=over)
 
 
 def _finite(attribute: Any, unit: float) -> float | None:

@@ -16,6 +16,7 @@ from artsim.export import FORMATS, export, prepare
 from artsim.export.options import ExportOptions
 from artsim.model.convex_bodies import is_convex
 from artsim.model.objects import ArticulatedObject
+from artsim.model.robot import as_robot
 from tests.conftest import ASSETS, installed
 
 
@@ -79,3 +80,16 @@ def test_the_program_writes_a_folder_once(tmp_path: Path, capsys: pytest.Capture
         Export(ASSETS / "laptop", tmp_path / "out").run()
     with pytest.raises(ArtsimError, match="there is no 'mesh'"):
         prepare(artsim.load(ASSETS / "laptop"), "mesh")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("category", ["mouse", "refrigerator"])
+def test_springs_damping_and_latches_come_back(category: str, tmp_path: Path) -> None:
+    """MJCF has no latches."""
+    obj = artsim.make(category, 0)
+    export(obj, tmp_path, ["usdz", "mjcf"])
+    for name in ("usdz", "mjcf"):
+        joints = zip(as_robot(artsim.load(tmp_path / FORMATS[name])).joints, as_robot(obj).joints, strict=True)
+        for again, joint in joints:
+            values = ["spring", "damping", "friction", "effort"] + ["hold", "hold_over"] * (name == "usdz")
+            found, wanted = ([getattr(one, value) for value in values] for one in (again, joint))
+            np.testing.assert_allclose(found, wanted, rtol=1e-6)
