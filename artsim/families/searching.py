@@ -19,7 +19,7 @@ Found = tuple[Assembly, Draws]
 
 _CHANGED, _RESIZED = 4, 5
 """Times that one draw is planned again: with other counts and choices, and with other lengths."""
-_OVERALL = ("length", "scale", "key_pitch", "width")
+_OVERALL = ("length", "diameter", "scale", "key_pitch", "width")
 """Parameters that others are shares of."""
 _LARGEST, _PART = 2, 0.2
 """Parameters without a fitting name that are tried, the longest of all; and the least share of a length that one is."""
