@@ -22,7 +22,7 @@ STEEPEST = np.deg2rad(8.5)
 """Largest tilt of the hinges from the vertical."""
 SLIM = 0.4
 """Share of the glasses whose temples are slim."""
-APART = 0.12
+APART = 0.16
 """Share of the glasses whose temples stay each on its own side: their hinges are upright, and their ends may hang."""
 
 
@@ -277,8 +277,9 @@ def _hinge(front: Front) -> tuple[Solid, Solid]:
 
 def _temple(draws: Draws, front: Front, bend: float, flat: bool) -> Solid:
     """Temple of the hinge at +y, along +x from the hinge at the origin, its end bent down."""
-    long = (0.92, 1.06) if draws.chance("long_temples", 0.75) else (0.42, 0.92)
-    length = 2 * front.half * draws.number("temple_length", long)
+    reach = draws.pick("temple_reach", {"usual": 0.55, "long": 0.2, "short": 0.25})
+    shares = {"usual": (0.92, 1.06), "long": (1.06, 1.24), "short": (0.42, 0.92)}[reach]
+    length = 2 * front.half * draws.number("temple_length", shares)
     x = np.concatenate([np.linspace(GAP, 0.6 * length, 4), np.linspace(0.68, 1.0, 8) * length])
     share = np.clip(x / length - draws.number("bend_start", (0.66, 0.74)), 0, 1)
     z = -bend * power(share / share[-1], draws.number("bend_sharpness", (1.2, 1.8)))
