@@ -20,6 +20,7 @@ _MARKS = ("dataset.json", "plan.json", "scenes.json", "motions.json", "estimator
 _OWN = (*_MARKS, "progress.jsonl", "weights.safetensors", "base.npz")
 _OBJECT = {
     "meta.json",
+    "params.json",
     "semantics.txt",
     "mobility.urdf",
     "mobility.xml",

@@ -175,7 +175,7 @@ def make_constrained(category: str, seed: int, constraints: Constraints) -> Arti
             params = Params(category, seed, draw, values_of(draws.drawn))
             source = source_name(category, seed, constraints)
             return replace(with_physics(made.build(category, str(seed))), source=source, params=params)
-    raise constraints.refusal(category, search.reached, ranges(search.seen))
+    raise constraints.refusal(category, search.reached, ranges(search.seen), search.outside)
 
 
 def _made_again(params: Params, seed: int, constraints: Mapping[str, Given]) -> ArticulatedObject:

@@ -3,12 +3,16 @@
 import inspect
 import sys
 from collections import Counter
+from collections.abc import Sequence
+from textwrap import wrap
 
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, draws_of
 from artsim.families.constraints import FEATURES, LENGTHS, described, measured, measured_length
 from artsim.making.assembly import Assembly
 from artsim.making.draws import Draws, ranges
+
+_WIDTH = 120
 
 
 def parameters(category: str) -> str:
@@ -48,13 +52,28 @@ def describe_family(category: str, count: int = 20) -> str:
         values = [measured_length(assembly, name) for assembly in made]
         lines.append((name, f"{min(values):.3g} to {max(values):.3g} m"))
     lines += [(name, f"{sum(bool(measured(assembly, name)) for assembly in made)} have some") for name in FEATURES]
-    seen = Counter(name for trace in traces for name in trace.drawn)
-    drawn = ranges(trace.drawn for trace in traces)
-    named = [(name, f"{described(draw)}{'' if seen[name] == count else f' ({seen[name]} have it)'}")
-             for name, draw in drawn.items() if draw.kind != "seed"]  # fmt: skip
-    return "\n".join([category, *(f"  {line}".rstrip() for line in text.splitlines()), "",
-                      f"  of {count} objects:", *_rows(lines), "",
-                      f"  parameters, as {count} objects draw them:", *_rows(named), ""])  # fmt: skip
+    return "\n".join([category, text, "", f"  of {count} objects:", *_rows(lines), "",
+                      f"  parameters, as {count} objects draw them:", *_rows(_parameters(traces)), ""])  # fmt: skip
+
+
+def _parameters(traces: Sequence[Draws]) -> list[tuple[str, str]]:
+    """What draws may give, by name; draws of one name that are numbered are told as one."""
+    first = {name for trace in traces for name in trace.drawn}
+
+    def base(name: str) -> str:
+        stem, _, number = name.rpartition("_")
+        return stem if number.isdigit() and stem in first else name
+
+    seen = Counter(name for trace in traces for name in {base(name) for name in trace.drawn})
+    drawn = ranges({base(name): draw} for trace in traces for name, draw in trace.drawn.items())
+    alike = Counter(base(name) for name in first)
+    told = []
+    for name, draw in drawn.items():
+        notes = [f"{seen[name]} have it"] if seen[name] < len(traces) else []
+        notes += [f"and {alike[name] - 1} more alike"] if alike[name] > 1 else []
+        if draw.kind != "seed":
+            told.append((name, described(draw) + (f" ({', '.join(notes)})" if notes else "")))
+    return told
 
 
 def seen_of(category: str, count: int) -> tuple[list[Draws], list[Assembly]]:
@@ -64,9 +83,11 @@ def seen_of(category: str, count: int) -> tuple[list[Draws], list[Assembly]]:
 
 
 def _rows(pairs: list[tuple[str, str]]) -> list[str]:
-    """Lines of a name and what it says, one below the other."""
+    """Lines of a name and what it says, one below the other, none wider than ``_WIDTH``."""
     wide = max((len(name) for name, _ in pairs), default=0)
-    return [f"  {name:{wide}s} {value}" for name, value in pairs]
+    indent = " " * (wide + 3)
+    lines = (wrap(f"  {name:{wide}s} {value}", _WIDTH, subsequent_indent=indent) for name, value in pairs)
+    return [line for several in lines for line in several]
 
 
 def _range(numbers: list[int]) -> str:

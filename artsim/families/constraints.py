@@ -11,6 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 import numpy as np
 
@@ -97,29 +98,37 @@ class Constraints:
         parameters = {key_of(name) for name in drawn}
         return [name for name, wanted in self.wanted if not _met(made, name, wanted, name in parameters)]
 
-    def refusal(self, category: str, reached: Sequence[Assembly], drawn: Mapping[str, Draw]) -> ConfigError:
+    def refusal(
+        self, category: str, reached: Sequence[Assembly], drawn: Mapping[str, Draw], outside: Collection[str]
+    ) -> ConfigError:
         """The error that says what objects of a category reach, where none of them meets the constraints.
 
-        ``drawn`` has the parameters of these names, as far as the family draws any.
+        ``drawn`` has its parameters, ``outside`` those that cannot have what is asked for.
         """
-        apart = [
-            name for name, wanted in self.wanted if not any(_met(made, name, wanted, name in drawn) for made in reached)
-        ]
-        shown = []
-        for name in apart or [name for name, _ in self.wanted]:
-            counted = name in NAMES or any(count_parts(made, name) for made in reached) or name not in drawn
-            shown.append(
-                _reached(name, [measured(made, name) for made in reached])
-                if counted and reached
-                else f"{name} {described(drawn[name]) if name in drawn else '0'}"
-            )
+        draws = {key_of(name): draw for name, draw in drawn.items()}
         kinds = sorted({label for made in reached for label in made.labels[1:]})
+        apart, strange, shown = [], [], []
+        for name, wanted in self.wanted:
+            counted = name in NAMES or any(count_parts(made, name) for made in reached)
+            if not (counted or name in draws):
+                strange.append(name)
+            elif name in outside or (reached and not any(_met(made, name, wanted, name in draws) for made in reached)):
+                apart.append(name)
+        for name in apart if apart or strange else [name for name, _ in self.wanted]:
+            if name in draws and (name in outside or not any(count_parts(made, name) for made in reached)):
+                shown.append(f"{name} is {described(draws[name])}")
+            elif reached:
+                shown.append(_reached(name, [measured(made, name) for made in reached]))
+        shown += [f"it has no parameter and no part {name}" for name in strange if reached]
+        alike = [found for name in strange for found in get_close_matches(name, [*drawn, *kinds], 3)]
+        together = "" if apart or strange else ", each is met, but not all of them at once"
+        names = ", ".join((*NAMES, *kinds))
         return ConfigError(
-            f"no object drawn has {self}{'' if apart else ', each is met, but not all of them at once'}. "
-            f"Drawn are {'; '.join(shown)}",
+            f"no object drawn has {self}{together}: {'; '.join(shown)}",
             category,
-            f"ask for values that are drawn, of {', '.join(NAMES)}, of its parts {', '.join(kinds)}, or of its "
-            f"parameters ('artsim families {category}' lists them); or leave a constraint out",
+            (f"did you mean {' or '.join(alike)}? Else " if alike else "")
+            + f"ask for values that are drawn of {names}, or of other parameters "
+            f"('artsim families {category}' lists them); or leave a constraint out",
         )
 
 
@@ -153,7 +162,7 @@ def measured_length(made: Assembly, name: str) -> float:
 def described(draw: Draw) -> str:
     """What a draw may give, as text: "0.4 to 0.6 m", "bar, bow or none"."""
     if draw.kind == "choice":
-        return ", ".join(draw.options)
+        return " or ".join(filter(None, (", ".join(draw.options[:-1]), draw.options[-1])))
     if draw.kind == "yes or no":
         return f"{draw.kind}, yes in {100 * draw.high:.3g} %"
     if draw.kind == "seed":

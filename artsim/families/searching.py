@@ -46,6 +46,8 @@ class Search:
         """Plans that do not meet the constraints."""
         self.seen: list[Mapping[str, Draw]] = []
         """Their draws, and those that what is asked for lies outside of."""
+        self.outside: set[str] = set()
+        """Names of the latter."""
         self._vain: Counter[tuple[str, str]] = Counter()
         self._choices: dict[str, Draw] = {}
         self._led_nowhere: Counter[tuple[str, Value]] = Counter()
@@ -57,7 +59,7 @@ class Search:
             return None
         made, draws = planned
         self.reached.append(made)
-        self.seen.append({key_of(name): one for name, one in draws.drawn.items()})
+        self.seen.append(draws.drawn)
         changed = self._changed(draw, made, draws)
         found = None if changed is None else self._resized(draw, *changed)
         for name, one in draws.drawn.items():
@@ -74,7 +76,8 @@ class Search:
                 return self.plan(draw, wanted)
             except UnmetError as problem:
                 if wanted is asked:
-                    self.seen.append({key_of(problem.name): problem.draw})
+                    self.seen.append({problem.name: problem.draw})
+                    self.outside.add(key_of(problem.name))
         return None
 
     def _others(self) -> dict[str, Wanted]:
@@ -112,7 +115,11 @@ class Search:
         """Values of parameters that may bring what is missing, those whose names speak of it first."""
         word, wanted = key_of(missing), dict(self.constraints.wanted)[missing]
         free = [(n, d) for n, d in self._free(draws).items() if self._vain[missing, n] < _VAIN]
-        for name, one in sorted(free, key=lambda pair: f"_{word}" not in f"_{pair[0]}"):
+
+        def strange(name: str) -> tuple[bool, bool]:
+            return f"_{word}" not in f"_{name}", key_of(name) not in made.labels
+
+        for name, one in sorted(free, key=lambda pair: strange(pair[0])):
             if one.kind == "integer" and isinstance(wanted, tuple):
                 now = float(measured(made, missing))  # type: ignore[arg-type]
                 value = round(float(one.value) + min(max(now, wanted[0]), wanted[1]) - now)
