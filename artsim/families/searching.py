@@ -108,7 +108,8 @@ class Search:
                 continue
             if not self._unmet(*again):
                 return (*again, {**asked, name: value})
-            self._vain[missing[0], name] += 1
+            same = measured(again[0], missing[0]) == measured(made, missing[0])
+            self._vain[missing[0], name] += _VAIN if same else 1
         return None
 
     def _changes(self, missing: str, made: Assembly, draws: Draws) -> Iterator[tuple[str, Value]]:
