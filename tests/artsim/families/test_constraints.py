@@ -72,7 +72,7 @@ def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_a_category_does_not_reach_is_told_with_what_it_does() -> None:
     with pytest.raises(ConfigError) as refused:
         make("laptop", 0, doors=3)
-    for words in ("laptop", "none of 30 objects", "door=3", "door 0 (30 times)", "Fix:", "its parts", "lid"):
+    for words in ("laptop", "no object drawn has door=3", "no parameter and no part door", "Fix:", "lid"):
         assert words in str(refused.value)
     with pytest.raises(ConfigError, match=r"size 0\.\d+ to 0\.\d+ m"):
         make("laptop", 0, size=(30, 40))
@@ -83,11 +83,11 @@ def test_what_a_category_does_not_reach_is_told_with_what_it_does() -> None:
 @pytest.mark.parametrize(
     ("constraints", "problem"),
     [
-        ({"doors": 2.5}, "whole"),
+        ({"joints": 2.5}, "whole"),
         ({"doors": (3, 1)}, "no range"),
-        ({"doors": -1}, "no range"),
+        ({"joints": -1}, "no range"),
         ({"doors": (1, 2, 3)}, "range"),
-        ({"doors": True}, "range"),
+        ({"joints": True}, "range"),
         ({"size": "big"}, "range"),
         ({"size": float("nan")}, "no range"),
         ({"handles": 3}, "handles=True or handles=False"),
@@ -101,7 +101,7 @@ def test_constraints_that_make_no_sense_are_refused(constraints: dict[str, Any],
         make("drawer", 0, **constraints)
 
 
-@pytest.mark.parametrize("text", ["doors", "doors=", "=2", "doors=two", "doors=1..2..3", "handles=maybe"])
+@pytest.mark.parametrize("text", ["doors", "doors=", "=2", "doors=two!", "doors=1..2..3", "handles=maybe"])
 def test_texts_that_are_no_constraints_are_refused(text: str) -> None:
     with pytest.raises(ConfigError, match="Fix:"):
         Constraints.parse([text])

@@ -134,3 +134,29 @@ def test_runs_that_make_no_sense_are_refused(more: dict[str, object], problem: s
     with pytest.raises((AssetError, ConfigError), match=problem):
         write_variations(**options)  # type: ignore[arg-type]
     assert not (tmp_path / "out").exists()
+
+
+def test_variations_of_a_procedural_object_are_made_of_other_parameters(tmp_path: Path) -> None:
+    first, second = make("laptop", 3), make("laptop", 4)
+    summary = write_variations("laptop:3", tmp_path / "near", 1, strength=0.2, progress=False)
+    between = write_variations("laptop:3", tmp_path / "between", 1, towards="laptop:4", progress=False)
+    assert not summary.failed
+    assert not between.failed
+    (step,) = summary.notes[0]["operations"]
+    assert step["operation"] == "parameters"
+    assert "width" in step["values"]
+    near, middle = (artsim.load(tmp_path / name / "0" / "params.json") for name in ("near", "between"))
+    assert near.sha256 == json.loads((tmp_path / "near" / "0" / "meta.json").read_text())["artsim"]["sha256"]
+    assert middle.params is not None
+    assert first.params is not None
+    assert second.params is not None
+    assert middle.params["width"] == pytest.approx(
+        0.5 * (float(first.params["width"]) + float(second.params["width"])), rel=0.05
+    )
+    again = write_variations(tmp_path / "near" / "0" / "params.json", tmp_path / "next", 1, progress=False)
+    assert not again.failed
+
+
+def test_only_procedural_objects_have_parameters_to_vary(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="procedural"):
+        write_variations(ASSETS / "laptop", tmp_path / "out", 1, strength=0.2, progress=False)
