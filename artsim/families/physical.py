@@ -4,9 +4,10 @@
 
 - A mass is that of the solids' volume and density, times ``filled``, the share of it that is matter in hollow things.
   What would lie in the last tenth of its category's range, or beyond it, in logarithms, is pressed into that tenth.
-- ``running`` is the friction of a joint, ``hold`` what a magnet, gasket or latch holds it shut with, less and less
-  until the joint has gone ``over`` degrees, and ``spring`` what it takes at the end of its travel. They are newtons at
-  the part's handle, or at its joint (newton metres where it turns). Parts of one label have the same.
+- ``running`` is the friction of a joint, ``hold`` what it takes to open it against that and a magnet, gasket or latch,
+  which pulls less and less until the joint has gone ``over`` degrees, and ``spring`` what it takes at the end of its
+  travel. They are newtons at the part's handle, or at its joint (newton metres where it turns). Parts of one label have
+  the same.
 """
 
 import json
@@ -87,7 +88,7 @@ def _dynamics(obj: ArticulatedObject, k: int) -> JointDynamics:
     drawn = {name: rng.uniform(*row[name]) if name in row else 0.0 for name in ("running", "hold", "spring", "over")}
     arm = lever_arm(obj, k) if row["at"] == "handle" and joint.type in ROTATING else 1.0
     travel = max(abs(joint.lower), abs(joint.upper))
-    friction, hold = drawn["running"] * arm, drawn["hold"] * arm
+    friction, hold = drawn["running"] * arm, max(drawn["hold"] - drawn["running"], 0.0) * arm
     over = np.deg2rad(drawn["over"])
     spring = drawn["spring"] * arm / travel if np.isfinite(travel) and travel > 0 else 0.0
     effort = _STRENGTH * (friction + hold + drawn["spring"] * arm)
