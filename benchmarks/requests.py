@@ -2,7 +2,8 @@
 
 Ten requests of each category, such as a user would type, are made out of what its first objects are like: numbers of
 parts and joints, joint types, lengths a tenth below and above the median, handles, legs, parameters, and two of two at
-once. Each is timed against the object of the same seed without a request, the fastest of ``repeats`` times.
+once. Each is timed over the median plain object of its category, and over the same object made of its parameters, the
+fastest of ``repeats`` times; plans and built objects are counted.
 """
 
 import json
@@ -34,8 +35,6 @@ class Options:
     objects: int = 20
     """Of each category, from which requests are made."""
     repeats: int = 3
-    list: bool = False
-    """Print each request."""
 
 
 def requests_of(category: str, count: int) -> list[Request]:
@@ -57,11 +56,9 @@ def requests_of(category: str, count: int) -> list[Request]:
     option = next((name for name in options if len({own[name].value for own in drawn}) > 1), None)
     number = next((name for name in usual if drawn[0][name].kind == "number"), None)
     either = [name for name in FEATURES if len({measured(one, name) for one in made}) == 2]
-    ranged, chosen, alike = (
-        (1.0, None),
-        {"joints": joints[0]},
-        [k for k in range(count) if len(made[k]) == joints[0] + 1],
-    )
+    ranged: Given = (1.0, None)
+    chosen: Request = {"joints": joints[0]}
+    alike = [k for k in range(count) if len(made[k]) == joints[0] + 1]
     if number:
         ranged = tuple(np.quantile([float(own[number].value) for own in drawn], (0.25, 0.5)).tolist())
     if option:
@@ -91,31 +88,28 @@ def fastest(repeats: int, make: Callable[..., object], *given: Any, **asked: Any
     return min(taken)
 
 
+def counting(work: Callable[..., Any], count: list[int]) -> Callable[..., Any]:
+    """The same function, which counts its calls."""
+
+    def counted(*given: Any) -> Any:
+        count[0] += 1
+        return work(*given)
+
+    return counted
+
+
 def main(options: Options) -> None:
     """Print what the module's words say."""
-    plans, builds = [0], [0]
-    build = Assembly.build
-
-    def built(made: Assembly, category: str, name: str) -> object:
-        builds[0] += 1
-        return build(made, category, name)
-
-    def counted(family: families.Family) -> families.Family:
-        def planned(draws: families.Draws) -> Assembly:
-            plans[0] += 1
-            return family(draws)
-
-        return planned
-
-    rows, medians, every, unmet, made = [], {}, [], [], []
+    rows, medians, every, unmet, built = [], {}, [], [], []
+    known, build = families.FAMILIES, Assembly.build
     for category in track("categories", options.categories, unit="category"):
-        own, same, plan = [], [], []
+        own, plans = [], []
         requests = requests_of(category, options.objects)
         plain = np.median([fastest(options.repeats, families.make, category, seed) for seed in range(len(requests))])
         for seed, request in enumerate(requests):
-            plans[0] = builds[0] = 0
-            known, Assembly.build = families.FAMILIES, built  # type: ignore[method-assign, assignment]
-            families.FAMILIES = {category: counted(known[category])}
+            planned, made = [0], [0]
+            families.FAMILIES = {category: counting(known[category], planned)}
+            Assembly.build = counting(build, made)  # type: ignore[method-assign]
             try:
                 obj = families.make(category, seed, **request)
             except ConfigError:
@@ -123,25 +117,21 @@ def main(options: Options) -> None:
                 continue
             finally:
                 families.FAMILIES, Assembly.build = known, build  # type: ignore[method-assign]
-            plan.append(plans[0])
-            made.append(builds[0])
+            plans.append(planned[0])
+            built.append(made[0])
             taken = fastest(options.repeats, families.make, category, seed, **request)
-            own.append(taken / plain)
-            same.append(taken / fastest(options.repeats, families.make, obj.params))
-            if options.list:
-                print(f"{category} {seed} {request}: {plans[0]} plans, {own[-1]:.2f}, {same[-1]:.2f}")
-        medians[category] = float(np.median(own)), float(np.median(same))
-        every += list(zip(own, same, strict=True))
-        numbers = (*medians[category], max(own), np.mean(plan))
-        rows.append(
-            (category, *(f"{number:.2f}" for number in numbers), f"{max(plan)}", f"{len(own)} of {len(requests)}")
-        )
+            own.append((taken / plain, taken / fastest(options.repeats, families.make, obj.params)))
+        medians[category] = np.median(own, axis=0).tolist()
+        every += own
+        numbers = (*medians[category], max(ratio for ratio, _ in own), np.mean(plans))
+        cells = (*(f"{number:.2f}" for number in numbers), f"{max(plans)}", f"{len(own)} of {len(requests)}")
+        rows.append((category, *cells))
     heading = ("category", "of a plain one", "of the same", "largest", "plans", "most", "met")
     print("\n".join(table([heading, *rows], most=len(rows))))
-    middle = np.median(every, axis=0).tolist()
-    slow = [name for name, (own, _) in medians.items() if own > 1.5]
-    print(json.dumps({"median": middle[0], "of_the_same": middle[1], "slower": slow, "met": len(every),
-                      "unmet": unmet, "builds": [min(made), max(made)], "medians": medians}))  # fmt: skip
+    plain_ratio, same_ratio = np.median(every, axis=0).tolist()
+    print(json.dumps({"median": plain_ratio, "of_the_same": same_ratio, "met": len(every), "unmet": unmet,
+                      "slower": [name for name, ratios in medians.items() if ratios[0] > 1.5],
+                      "builds": [min(built), max(built)], "medians": medians}))  # fmt: skip
 
 
 if __name__ == "__main__":

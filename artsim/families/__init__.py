@@ -202,7 +202,7 @@ def varied(params: Params, rng: np.random.Generator, strength: float) -> Params:
         elif draw.kind == "yes or no" and other:
             value = not value
         elif draw.kind in ("integer", "seed") and other:
-            value = int(rng.integers(draw.low, draw.high + 1))
+            value = int(rng.integers(int(draw.low), int(draw.high) + 1))
         values[name] = value
     return replace(params, values=values)
 

@@ -11,7 +11,8 @@ from itertools import islice
 from artsim.common.elementary import exp, log
 from artsim.families.constraints import AXES, LENGTHS, Constraints, measured, measured_length, meets
 from artsim.making.assembly import Assembly
-from artsim.making.draws import Draw, Draws, UnmetError, Value, Wanted, key_of
+from artsim.making.draws import Draw, Draws, UnmetError, Wanted, key_of
+from artsim.model.params import Value
 
 Plan = Callable[[int, Mapping[str, Wanted]], tuple[Assembly, Draws]]
 """What a category's draw of a number is, with some values that are asked for."""
@@ -84,10 +85,10 @@ class Search:
         """Of choices, the options that have not led nowhere so often, where there are some."""
         others: dict[str, Wanted] = {}
         for name, one in self._choices.items():
-            options = one.options or (True, False)
-            left = frozenset(option for option in options if self._led_nowhere[name, option] < _NOWHERE)
+            options: tuple[Value, ...] = one.options or (True, False)
+            left = [option for option in options if self._led_nowhere[name, option] < _NOWHERE]
             if 0 < len(left) < len(options):
-                others[name] = left if one.options else True in left
+                others[name] = frozenset(map(str, left)) if one.options else True in left
         return others
 
     def _unmet(self, made: Assembly, draws: Draws) -> list[str]:
@@ -96,7 +97,7 @@ class Search:
 
     def _changed(self, draw: int, made: Assembly, draws: Draws) -> tuple[Assembly, Draws, dict[str, Wanted]] | None:
         """With another count or choice where it has to be."""
-        missing, asked = self._unmet(made, draws), self.constraints.of_draws
+        missing, asked = self._unmet(made, draws), dict[str, Wanted](self.constraints.of_draws)
         if not missing:
             return made, draws, asked
         if len(missing) > 1:

@@ -147,7 +147,7 @@ def write_variations(
         "others": hashlib.sha256(" ".join(donor.sha256 for donor in donors).encode()).hexdigest() if donors else "",
     }
     if goal is not None or strength is not None:
-        origin |= {"strength": strength or 0.0, "towards": "" if goal is None else f"{goal.sha256} {count} {seed}"}
+        origin |= {"strength": str(strength or 0.0), "towards": "" if goal is None else f"{goal.sha256} {count} {seed}"}
     with folder_lock(folder), track("variations", total=count, unit="object", shown=progress) as bar:
         remove_unfinished(folder)
         for number in range(seed, seed + count):
