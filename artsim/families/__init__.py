@@ -12,12 +12,12 @@ from importlib import import_module
 
 import numpy as np
 
-from artsim.errors import ConfigError
+from artsim.errors import AssetError, ConfigError
 from artsim.families.constraints import Constraints, Given
 from artsim.families.physical import with_physics
 from artsim.families.searching import Search
 from artsim.making.assembly import Assembly
-from artsim.making.draws import Draws, Wanted, ranges, values_of
+from artsim.making.draws import Draws, UnmetError, Wanted, ranges, values_of
 from artsim.model.objects import ArticulatedObject
 from artsim.model.params import Params, Value
 
@@ -183,7 +183,11 @@ def _made_again(params: Params, seed: int, constraints: Mapping[str, Given]) -> 
         raise ConfigError("parameters say all of an object", "artsim.make", "change them: params.having(width=0.5)")
     _check(params.category, params.seed, params.draw)
     draws = Draws(_generator(params.category, params.seed, params.draw), params.values, lenient=True)
-    made = FAMILIES[params.category](draws).build(params.category, str(params.seed))
+    try:
+        made = FAMILIES[params.category](draws).build(params.category, str(params.seed))
+    except UnmetError as problem:
+        what = f"its parameters do not fit each other ({problem.name})"
+        raise AssetError(what, f"{params.category} {params.seed}", "change fewer of them") from problem
     source = f"parameters of {params.category}:{params.seed}"
     return replace(with_physics(made), source=source, params=replace(params, values=values_of(draws.drawn)))
 

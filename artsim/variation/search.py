@@ -58,6 +58,8 @@ def draw_variation(
         Of a procedural object: make it of parameters between its own and those of another one, at this share.
     """
     check_variable(obj, seed, others)
+    if not 0.0 <= (strength or 0.0) <= 1.0:
+        raise ConfigError(f"strength {strength} is none", fix="use a number between 0 and 1")
     standard = standard or Standard.of(obj)
     rejected: list[str] = []
     for draw in range(DRAWS):
@@ -66,7 +68,11 @@ def draw_variation(
         if strength is None and towards is None:
             made, operations = _draw(obj, rng, gentle, others)
         else:
-            made, operations = _by_parameters(obj, rng, (strength or 0.0) * gentle, towards, draw)
+            try:
+                made, operations = _by_parameters(obj, rng, (strength or 0.0) * gentle, towards, draw)
+            except AssetError:
+                rejected.append("parameters that fit each other")
+                continue
         if not operations:
             continue
         made = _named(made, obj, seed, operations)

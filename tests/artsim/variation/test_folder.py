@@ -160,3 +160,5 @@ def test_variations_of_a_procedural_object_are_made_of_other_parameters(tmp_path
 def test_only_procedural_objects_have_parameters_to_vary(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="procedural"):
         write_variations(ASSETS / "laptop", tmp_path / "out", 1, strength=0.2, progress=False)
+    with pytest.raises(ConfigError, match="between 0 and 1"):
+        artsim.vary(make("laptop", 3), strength=2.0)
