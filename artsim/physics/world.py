@@ -190,13 +190,13 @@ class Simulation:
             target[self._driven], strength[self._driven] = wanted, self.effort_limit
         for _ in range(self.options.substeps):
             if control == "effort":
-                slow = self._rate * np.sign(wanted) < self.velocity_limit
+                slow = self._rate * np.sign(wanted) <= self.velocity_limit
                 efforts[self._driven] = np.where(slow, wanted, 0.0)
             self._advance(efforts, target, strength)
 
     def _advance(self, efforts: Array, target: Array, strength: Array) -> None:
         """One time step under efforts, (J,), with joints held at target speeds as far as strengths go, (J,) each."""
-        time_step, follow = self.options.time_step, self._follow
+        time_step, follow, pushed = self.options.time_step, self._follow, np.sign(efforts[self._driven])
         if self._latched:
             values, efforts = follow @ self._value + self._offset, efforts.copy()
             for j, joint in self._latched:
@@ -209,6 +209,9 @@ class Simulation:
         momentum = pulled @ free - time_step * (self._spring @ self._value)
         mass = pulled @ follow + time_step * self._damping + time_step**2 * self._spring
         rate = held_speeds(mass, momentum, follow, target, time_step * strength)
+        # What drives a light knob past its velocity limit within one step has let go of it by then.
+        most = np.maximum(pushed * self._rate, self.velocity_limit)
+        rate = np.where((pushed != 0.0) & (pushed * rate > most), pushed * most, rate)
         value = self._value + time_step * rate
         inside = np.clip(value, self._lower, self._upper)
         stopped = (value != inside) & ((value - inside) * rate > 0)

@@ -124,7 +124,7 @@ def test_lids_stay_where_they_are_left_unless_gravity_pulls() -> None:
         return float((after["joint_state"] - before["joint_state"]).abs().max())
 
     assert moved() < 1e-4
-    assert moved(gravity=True) > 0.1
+    assert moved(gravity=True) > 0.05  # against the friction of its hinge
 
 
 # Goals and rewards

@@ -18,10 +18,11 @@ from artsim.export.mjcf import mjcf_text
 from artsim.export.options import ExportOptions
 from artsim.export.text import obj_text
 from artsim.families import FAMILIES, make
+from artsim.families.physical import feel_of, lever_arm
 from artsim.loading.sources import find_sources
 from artsim.model.inertia import combine_inertias
 from artsim.model.kinematics import Array, KinematicTree
-from artsim.model.objects import ArticulatedObject
+from artsim.model.objects import UNKNOWN_DYNAMICS, ArticulatedObject
 from artsim.model.part_inertia import part_inertia
 from artsim.model.robot import as_robot
 from artsim.physics import world
@@ -42,11 +43,13 @@ def engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> s
 
 
 def unlimited(obj: ArticulatedObject) -> ArticulatedObject:
-    """The object with stops far away."""
+    """The object with stops far away, and without latches, springs and the strength that opens them."""
+    bodies = [part.body and replace(part.body, joint=UNKNOWN_DYNAMICS) for part in obj.parts]
+    parts = tuple(replace(part, body=body) for part, body in zip(obj.parts, bodies, strict=True))
     joints = [
         replace(j, lower=-1e3, upper=1e3) if j.type in ("revolute", "prismatic") else j for j in obj.native_tree.joints
     ]
-    return replace(obj, native_tree=KinematicTree(joints))
+    return replace(obj, parts=parts, native_tree=KinematicTree(joints))
 
 
 def energy(obj: ArticulatedObject, q: Array, velocity: Array) -> float:
@@ -135,6 +138,48 @@ def test_friction_holds_a_drawer_until_the_push_exceeds_it(one_drawer: Articulat
         for _ in range(5):
             simulation.step([push * friction])
         assert (simulation.state[k] > 1e-6) == moves
+
+
+def test_what_opens_a_joint_is_within_the_range_of_its_row() -> None:
+    for category, state in (("refrigerator", 0.0), ("refrigerator", 0.5), ("keyboard", 1.0), ("laptop", 0.5)):
+        obj = make(category, 0)
+        k = int(obj.tree.free_joints[0])
+        feel = feel_of(category, obj.parts[k].label, obj.tree.types[k])
+        assert feel is not None
+        low, high = feel["running"] if state == 0.5 else feel.get("hold", feel.get("spring"))
+        simulation = Simulation(obj, replace(FREE, friction=1.0, gravity=0.0, substeps=1))
+        arm = lever_arm(obj, k) if feel["at"] == "handle" else 1.0
+        for force, moves in ((0.98 * low, False), (1.02 * high, True)):
+            q = np.zeros(len(obj))
+            q[k] = (1.0 - 1e-3) * state * obj.tree.limits[k, 1]
+            simulation.reset(q)
+            simulation.step(np.where(obj.tree.free_joints == k, force * arm, 0.0))
+            assert (simulation.state[k] > q[k] + 1e-10) == moves, (category, state, force)
+
+
+def test_a_light_knob_is_not_driven_past_its_velocity_limit() -> None:
+    simulation = Simulation(make("camera", 3), PhysicsOptions(substeps=1))
+    for _ in range(5):
+        simulation.step(simulation.effort_limit)
+        driven = simulation.velocity[simulation.obj.tree.free_joints]
+        assert np.all(driven <= simulation.velocity_limit + 1e-9)
+
+
+@pytest.mark.parametrize("category", ["keyboard", "remote", "phone"])
+def test_sprung_keys_come_back_and_stay_calm_in_mujoco(category: str) -> None:
+    import mujoco
+
+    robot = as_robot(make(category, 0))
+    files = {f"{mesh.name}.obj": obj_text(mesh).encode() for mesh in robot.meshes}
+    model = mujoco.MjSpec.from_string(mjcf_text(robot, ExportOptions()), assets=files).compile()
+    data = mujoco.MjData(model)
+    sprung = [joint for joint in robot.joints if joint.spring]
+    place = [model.joint(joint.name).qposadr[0] for joint in sprung]
+    data.qpos[place] = [0.5 * joint.upper for joint in sprung]
+    mujoco.mj_step(model, data, 1000)
+    assert not any(warning.number for warning in data.warning)
+    assert np.abs(data.qvel).max() < 1e-3
+    assert np.all(data.qpos[place] < [0.2 * joint.upper for joint in sprung])
 
 
 def test_a_motor_holds_the_speed_it_is_told() -> None:
