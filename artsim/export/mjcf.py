@@ -115,8 +115,7 @@ def _add_body(
     etree.SubElement(body, "inertial", pos=pos, mass=number(inertia.mass), fullinertia=numbers(entries))
     if joint is not None:
         more = {"range": numbers((joint.lower, joint.upper)), **STOP} if np.isfinite(joint.lower) else {}
-        # MuJoCo takes springs as they are when a step begins, which throws light keys about. As damping, and as a rotor,
-        # a step's share of the spring calms them: the spring then answers within a step or two.
+        # Beside their damping, this inertia keeps light keys calm, and out of their stops.
         rotor = {"stiffness": joint.spring, "springref": 0.0, "armature": TIME_STEP**2 * joint.spring}
         sprung = {name: number(value) for name, value in rotor.items()} if joint.spring else {}
         etree.SubElement(
@@ -125,7 +124,7 @@ def _add_body(
             name=joint.name,
             type="slide" if joint.type == "prismatic" else "hinge",
             axis=numbers(joint.axis),
-            damping=number(max(joint.damping, TIME_STEP * joint.spring)),
+            damping=number(joint.damping),
             frictionloss=number(joint.friction),
             actuatorfrcrange=numbers((-joint.effort, joint.effort)),
             **sprung,

@@ -19,6 +19,9 @@ from artsim.model.part_inertia import part_inertia
 GRAVITY = 9.81
 DECAY = 0.5
 """Seconds in which a joint's damping takes away most (1 - 1/e) of its speed."""
+SPRING_TIME = 0.002
+"""Seconds in which a spring brings a light key back, at least: damping over stiffness. MuJoCo takes springs as they are
+when a step of 2 ms begins, which throws keys about that nothing damps so much."""
 SLIDING_FRICTION = 0.05
 """Friction of a slide over the weight that it carries."""
 PIN_RADIUS = 0.002
@@ -236,6 +239,7 @@ def _joint(obj: ArticulatedObject, k: int, parent: int, child: int, carried: Ine
     derived = _link_joint(joint.name, kind, parent, child, joint, joint.lower, joint.upper, carried, mimic)
     said = {} if body is None or obj.scale != 1.0 else asdict(body.joint)
     least = said.pop("least_effort", None) or 0.0
+    derived = replace(derived, damping=max(derived.damping, SPRING_TIME * (said.get("spring") or 0.0)))
     known = replace(derived, **{name: value for name, value in said.items() if value is not None})
     return replace(known, effort=max(known.effort, least))
 
