@@ -9,12 +9,14 @@ import pytest
 
 from artsim.errors import AssetError
 from artsim.families import FAMILIES, make
+from artsim.families.physical import physical_ranges
 from artsim.loading.urdf import load
 from artsim.making.assembly import Assembly, prismatic
 from artsim.making.solids import Solid, box
 from artsim.model.inertia import combine_inertias
 from artsim.model.objects import ArticulatedObject
 from artsim.model.part_inertia import part_inertia
+from artsim.model.robot import as_robot
 from tests.conftest import ASSETS, valve
 
 
@@ -74,3 +76,12 @@ def test_inertias_of_every_family_are_those_of_possible_bodies(category: str) ->
         moments = np.linalg.eigvalsh(part_inertia(obj, k).tensor)
         assert moments[0] > 0
         assert moments[2] <= moments[:2].sum() * (1 + 1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("category", sorted(physical_ranges()["mass"]))
+def test_objects_weigh_what_real_ones_do(category: str) -> None:
+    row = physical_ranges()["mass"][category]
+    for seed in range(2):
+        mass = sum(link.inertia.mass for link in as_robot(make(category, seed)).links)
+        assert row["low"] <= mass <= row["high"]
