@@ -104,7 +104,7 @@ def openings(category: str, seed: int) -> dict[tuple[str, str, str], dict[str, A
 
 def peak_of(feel: dict[str, Any]) -> list[float]:
     """The cited range of the peak."""
-    bounds: list[float] = feel.get("hold", feel.get("spring", feel.get("running")))
+    bounds: list[float] = next(feel[name] for name in ("hold", "spring", "running") if name in feel)
     return bounds
 
 
