@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from artsim.model.details import numbered
 from artsim.model.kinematics import Array, KinematicTree
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
@@ -66,8 +67,13 @@ def reorder_sample(sample: Sample, order: Sequence[int]) -> Sample:
     mask = sample.part_mask
     if mask is not None:
         mask = np.append(number, np.full(256 - len(number), 255))[mask].astype(np.uint8)
+    turn = sorted(range(len(sample.details)), key=lambda d: number[sample.details[d].part])
+    details = numbered(replace(sample.details[d], part=int(number[sample.details[d].part])) for d in turn)
+    on = sample.detail
+    if on is not None:
+        on = np.append(np.argsort(turn), np.full(256 - len(turn), 255))[on].astype(np.uint8)
     return replace(
-        sample, part=number[sample.part].astype(np.uint8), part_mask=mask,
+        sample, part=number[sample.part].astype(np.uint8), part_mask=mask, details=details, detail=on,
         joint_parent=np.where(parents < 0, -1, number[parents]),
         joint_type=tuple(sample.joint_type[k] for k in order), part_names=tuple(sample.part_names[k] for k in order),
         **{name: getattr(sample, name)[rows] for name in per_part},

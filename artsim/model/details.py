@@ -1,8 +1,9 @@
 """Labelled pieces of a part that are no parts of their own: handles, knobs, buttons, panels, panes, displays."""
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -85,6 +86,16 @@ class DetailFrame:
         if not all(isinstance(text, str) for text in texts):
             raise ValueError(f"a detail is {data!r:.60}")
         return DetailFrame(texts[0], texts[1], part, T, size)
+
+
+def numbered(details: Iterable[DetailFrame]) -> tuple[DetailFrame, ...]:
+    """Details in the order of their parts, each named by its label and its number among those."""
+    counts = Counter[str]()
+    named = []
+    for detail in details:
+        counts[detail.label] += 1
+        named.append(replace(detail, name=f"{detail.label}_{counts[detail.label]}"))
+    return tuple(named)
 
 
 def detail_of(

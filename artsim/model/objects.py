@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,7 +16,7 @@ from artsim.common.products import norm
 from artsim.common.showing import Showable
 from artsim.common.tables import brief, centimetres, cut, joint_value, label_of, plural, table, three_digits
 from artsim.errors import AssetError, ConfigError, KinematicsError
-from artsim.model.details import NO_DETAIL, Detail, DetailFrame, detail_of_faces, on_faces
+from artsim.model.details import NO_DETAIL, Detail, DetailFrame, detail_of_faces, numbered, on_faces
 from artsim.model.inertia import Inertia
 from artsim.model.joints import LARGEST
 from artsim.model.kinematics import Array, KinematicTree
@@ -287,16 +286,13 @@ class ArticulatedObject(Showable):
     @cached_property
     def details(self) -> tuple[DetailFrame, ...]:
         """Handles, knobs, panes and other labelled pieces of the parts, in their order."""
-        found, counts = [], Counter[str]()
+        found = []
         for k, part in enumerate(self.parts):
             for detail in part.details:
-                counts[detail.label] += 1
                 T = detail.T_rest_detail.copy()
                 T[:3, 3] *= self.scale
-                found.append(
-                    DetailFrame(f"{detail.label}_{counts[detail.label]}", detail.label, k, T, detail.size * self.scale)
-                )
-        return tuple(found)
+                found.append(DetailFrame("", detail.label, k, T, detail.size * self.scale))
+        return numbered(found)
 
     def detail_of_points(self, points: Array, part: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """(N,) which of ``details`` points of the surface belong to: its number, or 255.

@@ -168,7 +168,7 @@ def test_the_likeliest_bin_is_the_one_nearest_to_the_mean() -> None:
 
 @pytest.mark.parametrize("phase", [CLONING, OWN_STATES, JOINT], ids=["cloning", "own states", "joint"])
 def test_the_agent_learns_what_the_expert_does(phase: Phase) -> None:
-    options = PPOOptions(epochs=25, minibatch=18)
+    options = PPOOptions(epochs=30, minibatch=18)
     agent = an_agent()
     buffer = a_buffer(agent, phase)
     optimizer, first = torch.optim.Adam(agent.parameters(), 3e-3), value_error(agent, buffer)

@@ -52,11 +52,15 @@ def test_a_sample_in_another_order_is_one_of_the_object_in_that_order() -> None:
         rng = np.random.default_rng(0)
         q = artsim.sample_state(obj, artsim.StateOptions(), rng)
         camera = sample_view(obj, q, ViewOptions(), rng)
-        own = artsim.observe(obj, q, camera, images=("part_mask",), rng=np.random.default_rng(1))
-        other = artsim.observe(sort_parts(obj), q[order], camera, images=("part_mask",), rng=np.random.default_rng(1))
+        own = artsim.observe(obj, q, camera, images=("part_mask",), rng=np.random.default_rng(1), details=True)
+        other = artsim.observe(
+            sort_parts(obj), q[order], camera, images=("part_mask",), rng=np.random.default_rng(1), details=True
+        )
         turned = reorder_sample(own, order)
         for field in fields(own):
-            if field.name not in _DRAWN:
+            if field.name == "details":
+                assert [d.to_dict() for d in turned.details] == [d.to_dict() for d in other.details]
+            elif field.name not in _DRAWN:
                 assert np.array_equal(getattr(turned, field.name), getattr(other, field.name)), field.name
         names, again = np.array(own.part_names), np.array(turned.part_names)
         assert (names[own.part] == again[turned.part]).all()

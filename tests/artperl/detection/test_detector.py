@@ -34,7 +34,7 @@ NO_FLAWS = Flaws(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("detector") / "scenes"
-    generate_scenes(RUN, folder, 1, seed=11, workers=1, progress=False)
+    generate_scenes(RUN, folder, 1, seed=12, workers=1, progress=False)
     return folder
 
 
