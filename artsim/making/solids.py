@@ -22,8 +22,8 @@ from artsim.making.solid import Solid, deferred, mesh_of, union
 from artsim.model.kinematics import Array
 
 __all__ = [
-    "Solid", "box", "cylinder", "deferred", "ellipsoid", "frame", "hull", "hull_of", "loft", "mesh_of", "posts", "prism",
-    "revolved", "ring", "rod", "tray", "tube", "union", "vessel",
+    "Solid", "box", "cylinder", "deferred", "ellipsoid", "frame", "hull", "hull_of", "loft", "mesh_of", "posts",
+    "prism", "revolved", "ring", "rod", "tray", "tube", "union", "vessel",
 ]  # fmt: skip
 
 Along = float | tuple[float, float]
