@@ -1,11 +1,14 @@
 """An estimate as an articulated object: a box for each part, with openings for what lies inside, joints and limits."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from artperl.core.estimate import Estimate, points_at_rest
 from artsim.common.products import apply, matmul
 from artsim.errors import ConfigError
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
@@ -20,7 +23,32 @@ _DENSITY = 300.0
 """kg/m^3 of what is known as a box alone: furniture and appliances, hollow, have about as much."""
 
 
-def estimated_object(estimate: Estimate, category: str = "object", name: str = "estimate") -> tuple[
+class Parts(Protocol):
+    """What an estimate says of K parts; see :class:`artperl.core.estimate.Estimate`."""
+
+    @property
+    def T_camera_part(self) -> Array: ...
+    @property
+    def translation(self) -> Array: ...
+    @property
+    def size(self) -> Array: ...
+    @property
+    def state(self) -> Array: ...
+    @property
+    def joint_type(self) -> tuple[str, ...]: ...
+    @property
+    def joint_parent(self) -> NDArray[np.int64]: ...
+    @property
+    def joint_axis(self) -> Array: ...
+    @property
+    def joint_origin(self) -> Array: ...
+    @property
+    def joint_limits(self) -> Array: ...
+    @property
+    def part_names(self) -> tuple[str, ...]: ...
+
+
+def estimated_object(estimate: Parts, category: str = "object", name: str = "estimate") -> tuple[
     ArticulatedObject, Array, Array
 ]:  # fmt: skip
     """The object that an estimate describes, where it is, and its joint states.
@@ -30,7 +58,8 @@ def estimated_object(estimate: Estimate, category: str = "object", name: str = "
 
     Parameters
     ----------
-    estimate : Estimate
+    estimate : Parts
+        Such as :class:`artperl.core.estimate.Estimate`.
     category, name : str
 
     Returns
@@ -49,9 +78,9 @@ def estimated_object(estimate: Estimate, category: str = "object", name: str = "
     T = np.asarray(estimate.T_camera_part, dtype=np.float64)
     if not (np.isfinite(estimate.size).all() and (estimate.size > 0).all()):
         raise ConfigError("a box of the estimate has no size", name, "give a cloud that shows the object")
-    center = points_at_rest(estimate.translation, T)
-    axes = apply(np.swapaxes(T[:, :3, :3], 1, 2), estimate.joint_axis)
-    origins = points_at_rest(estimate.joint_origin, T)
+    back, at = np.swapaxes(T[:, :3, :3], 1, 2), T[:, :3, 3]
+    center, axes = apply(back, estimate.translation - at), apply(back, estimate.joint_axis)
+    origins = apply(back, estimate.joint_origin - at)
     low, high = center - 0.5 * estimate.size, center + 0.5 * estimate.size
     gap = _GAP * float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))
     names = _names(estimate)
@@ -98,7 +127,7 @@ def boxes_without(
     return left or [(low, high)]
 
 
-def _joint(estimate: Estimate, k: int, parent: str, axis: Array, origin: Array) -> tuple[JointSpec, float]:
+def _joint(estimate: Parts, k: int, parent: str, axis: Array, origin: Array) -> tuple[JointSpec, float]:
     """The joint of part k, and its state within the limits."""
     kind, state = estimate.joint_type[k], float(estimate.state[k])
     lower, upper = (float(end) for end in estimate.joint_limits[k]) if len(estimate.joint_limits) else (-np.inf, np.inf)
@@ -112,7 +141,7 @@ def _joint(estimate: Estimate, k: int, parent: str, axis: Array, origin: Array) 
     return revolute(parent, axis, origin, lower, upper), float(np.clip(state, lower, upper))
 
 
-def _names(estimate: Estimate) -> list[str]:
+def _names(estimate: Parts) -> list[str]:
     """A proper name for each part, the same ones numbered."""
     names: list[str] = []
     for k in range(len(estimate.joint_type)):

@@ -14,7 +14,7 @@ import json
 import zlib
 from dataclasses import replace
 from functools import lru_cache
-from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,7 @@ _STRENGTH = 3.0
 @lru_cache(maxsize=1)
 def physical_ranges() -> dict[str, Any]:
     """``mass`` by category, and rows of ``joints``."""
-    found: dict[str, Any] = json.loads(files("artsim.families").joinpath("physical.json").read_text())
+    found: dict[str, Any] = json.loads(Path(__file__).with_name("physical.json").read_text())
     return found
 
 

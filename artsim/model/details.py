@@ -4,7 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,8 @@ from artsim.common.elementary import cos, sin
 from artsim.common.products import apply, cross, dot, matmul, norm, unit
 from artsim.model.kinematics import Array
 
-if TYPE_CHECKING:
-    from artsim.model.objects import Mesh
-
+Mesh = tuple[Array, NDArray[np.int32]]
+"""Vertices (V, 3) and triangles (F, 3)."""
 DETAILS = ("handle", "knob", "button", "panel", "glass", "display", "latch")
 """Labels of details. PartNet-Mobility's names of visuals say these and their like."""
 GRIPS = ("handle", "knob", "latch")
@@ -40,7 +39,7 @@ class Detail:
     """(4, 4) its frame in the rest frame, at rest, native units."""
     size: Array
     """(3,) sides of its box along the axes of its frame, native units."""
-    pieces: tuple["Mesh", ...] = ()
+    pieces: tuple[Mesh, ...] = ()
     """Convex meshes that it is made of, in the rest frame, native units; empty where ``faces`` says what is its."""
     faces: NDArray[np.int64] | None = None
     """Faces of its part's surface that are its; None where ``pieces`` say so."""
@@ -66,6 +65,11 @@ class DetailFrame:
     """(4, 4) its frame in the rest frame, at rest, metres; see :class:`Detail`."""
     size: Array
     """(3,) sides of its box along the axes of its frame, metres."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, DetailFrame) and self.to_dict() == other.to_dict()
+
+    __hash__ = None  # type: ignore[assignment]
 
     def to_dict(self) -> dict[str, Any]:
         """As :meth:`from_dict` reads it."""
@@ -103,7 +107,7 @@ def detail_of(
     points: Array,
     surface: Array,
     outward: Array | None = None,
-    pieces: "tuple[Mesh, ...]" = (),
+    pieces: tuple[Mesh, ...] = (),
     faces: NDArray[np.int64] | None = None,
 ) -> Detail:
     """A detail with a frame.

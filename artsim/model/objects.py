@@ -17,6 +17,7 @@ from artsim.common.showing import Showable
 from artsim.common.tables import brief, centimetres, cut, joint_value, label_of, plural, table, three_digits
 from artsim.errors import AssetError, ConfigError, KinematicsError
 from artsim.model.details import NO_DETAIL, Detail, DetailFrame, detail_of_faces, numbered, on_faces
+from artsim.model.details import Mesh as Mesh
 from artsim.model.inertia import Inertia
 from artsim.model.joints import LARGEST
 from artsim.model.kinematics import Array, KinematicTree
@@ -47,10 +48,6 @@ class Repair:
 
     def __str__(self) -> str:
         return printable(f"{self.where}: {self.what}", _MAX_REPAIR)
-
-
-Mesh = tuple[Array, NDArray[np.int32]]
-"""Vertices (V, 3) and triangles (F, 3)."""
 
 
 @dataclass(frozen=True)
