@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from artsim.common.sequences import listed
 from artsim.errors import AssetError, ConfigError
-from artsim.families import FAMILIES, make_constrained, source_name
+from artsim.families import FAMILIES
 from artsim.families.constraints import NO_CONSTRAINTS, Constraints
+from artsim.loading.family_source import FamilySource as FamilySource
 from artsim.model.objects import ArticulatedObject
 
 # The modules that read files take longer to import than a procedural object to make: who makes some does without.
@@ -39,48 +39,6 @@ class FileSource:
 
         return load(self.path, package_roots=self.package_roots, body=self.body)
 
-
-@dataclass(frozen=True)
-class FamilySource:
-    """A procedural object to make."""
-
-    category: str
-    seed: int
-    constraints: Constraints = NO_CONSTRAINTS
-    """Of :func:`artsim.make`."""
-
-    @staticmethod
-    def named(name: str) -> FamilySource | None:
-        """The source of this name; None where it is none of a procedural object."""
-        found = _NAME.fullmatch(name)
-        if found is None or found["category"] not in FAMILIES:
-            return None
-        try:
-            source = FamilySource(
-                found["category"],
-                int(found["seed"]),
-                Constraints.parse(found["constraints"].split(",") if found["constraints"] else []),
-            )
-        except ConfigError:
-            return None
-        return source if source.name == name else None
-
-    @property
-    def name(self) -> str:
-        """Category, constraints and seed."""
-        return source_name(self.category, self.seed, self.constraints)
-
-    @property
-    def sha256(self) -> str:
-        """Digest of the name: the version of artsim, which a plan holds too, decides on the rest."""
-        return hashlib.sha256(self.name.encode()).hexdigest()
-
-    def load(self) -> ArticulatedObject:
-        """The object."""
-        return make_constrained(self.category, self.seed, self.constraints)
-
-
-_NAME = re.compile(r"(?P<category>[a-z_]+)(\[(?P<constraints>[^\[\]]{1,1000})\])?:(?P<seed>[0-9]{1,19})")
 
 Source = FileSource | FamilySource
 

@@ -25,6 +25,7 @@ from artsim.loading.bodies import (
 from artsim.loading.described_bodies import with_described_bodies
 from artsim.loading.details import named_faces, with_details
 from artsim.loading.documents import read_document
+from artsim.loading.family_source import FamilySource
 from artsim.loading.mesh_files.surface import is_thin
 from artsim.loading.meshes import LoadLimits, MeshReader, UnusableMeshError, check_range, merge_shapes
 from artsim.loading.object_files import category_of_folder, find_urdf, is_params, max_bytes, object_id, read_urdf
@@ -32,7 +33,6 @@ from artsim.loading.packages import MissingFileError
 from artsim.loading.partnet import read_side_files
 from artsim.loading.rest_frame import rest_rotation
 from artsim.loading.rest_state import canonical_category, rest_state
-from artsim.loading.sources import FamilySource
 from artsim.loading.urdf_document import Shape, UrdfJoint, UrdfLink, UrdfRobot
 from artsim.model.joints import Joint, Mimic
 from artsim.model.kinematics import Array, KinematicTree
