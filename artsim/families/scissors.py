@@ -45,7 +45,7 @@ class Ring:
         self.turn = draws.angle("turn", (0.0, 0.3))  # of its long axis from X
         self.egg = draws.number("egg", (0.0, 0.35))  # by how much it is wider at the back than at the front
         half = hypot(along * sin(self.turn), (1 + self.egg) * across * cos(self.turn)) + 0.6 * bar
-        y = half + GAP + reach * draws.number("spacing", (0.0, 0.05), (0.0, 0.12))
+        y = half + GAP + reach * draws.number("spacing", (0.0, 0.05), (0.0, 0.08))
         self.center = np.array([reach - along - bar - shift, y])
 
     def loop(self) -> Array:
@@ -70,7 +70,7 @@ def build(draws: Draws) -> Assembly:
     height = bar * draws.number("bar_height", (0.8, 1.3)) if plastic else max(bar, 2.6 * sheet)
     reach = length - blade
     kind = draws.pick("rings", {"same": 0.4, "long": 0.4, "offset": 0.2})
-    slope = tan(draws.angle("ring_slope", (0.1, 0.5))) if draws.chance("bent_handles", 0.12) else 0.0
+    slope = tan(draws.angle("ring_slope", (0.1, 0.3))) if draws.chance("bent_handles", 0.08) else 0.0
     front = 0.6 * width + 0.7 * bar  # clear of the other blade's tang
     ringed = draws.within("ring")
     rings = [Ring(ringed, front, reach, bar, kind, second, plastic, slope) for second in (False, True)]
