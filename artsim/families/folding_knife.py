@@ -60,7 +60,7 @@ def build(draws: Draws) -> Assembly:
         pair = many and draws.chance("pair", 0.5)
         for side in (-1, 1) if pair else (-1,):
             # Of a pair, the upper corner of each point stays before the middle while the blade turns.
-            room = np.sqrt(0.23 * span**2 - edge**2) if pair else span + 0.5 * half
+            room = np.sqrt(0.23 * (span * span) - edge * edge) if pair else span + 0.5 * half
             kind = "blade" if number == 0 or draws.chance("second_blade", 0.5) else "tool"
             back_edge = -half * draws.number("blade_width", (0.7, 1.05))
             long = room * draws.number("blade_length", (0.88, 1.0))
