@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from artperl.inputs.bounds import MAX_LINE_BYTES, MAX_LINES, MAX_TEXT_BYTES, guard, read_file
+from artsim.common.names import is_number
 from artsim.errors import ConfigError
 
 Array = NDArray[np.float64]
@@ -93,7 +94,7 @@ def _head(data: bytes) -> tuple[int, str, str]:
         if not bare or (len(words) == 1 and not comment):  # a count of points, as .pts and some .xyz have it
             continue
         named = {"x", "y", "z"} <= {_plain(word) for word in re.split(r"[;,\s]+", names)}
-        if not comment and (named or all(_is_number(word.strip("\"'")) for word in words)):  # labels may be words
+        if not comment and (named or all(is_number(word.strip("\"'")) for word in words)):  # labels may be words
             return number, names, bare
         text = bare.lstrip("#/%; ") if comment and not bare.startswith("//X") else bare
         if {"x", "y", "z"} <= {_plain(word) for word in re.split(r"[;,\s]+", text)} or not comment:
@@ -103,14 +104,6 @@ def _head(data: bytes) -> tuple[int, str, str]:
 
 def _split(line: str, separator: str | None) -> list[str]:
     return [word.strip().strip("\"'") for word in line.strip().split(separator)]
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def _plain(name: str) -> str:

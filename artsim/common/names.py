@@ -94,3 +94,12 @@ def unused_name(name: str, used: set[str]) -> str:
         name += "_"
     used.add(name)
     return name
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is one, as Python reads it."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

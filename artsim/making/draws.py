@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from artsim.common.elementary import exp
+from artsim.common.names import is_number
 from artsim.model.kinematics import Array
 from artsim.model.params import Value
 
@@ -195,7 +196,7 @@ class Draws:
         if wanted is not None and not _names(wanted, _text(chosen)):
             open_to = [o for k, o in enumerate(every) if chances is None or chances[k] > 0]
             fitting = [option for option in open_to if _names(wanted, _text(option))]
-            countable = isinstance(wanted, tuple) and not any(_is_number(option) for option in names)
+            countable = isinstance(wanted, tuple) and not any(is_number(option) for option in names)
             if not fitting and not self._trace.lenient and not countable:
                 raise UnmetError(key, Draw(_text(chosen), "choice", options=names))
             if fitting:
@@ -284,16 +285,8 @@ def _names(wanted: Wanted, option: str) -> bool:
     if isinstance(wanted, (frozenset, set)):
         return option in wanted
     if isinstance(wanted, tuple):
-        return _is_number(option) and wanted[0] <= float(option) <= wanted[1]
+        return is_number(option) and wanted[0] <= float(option) <= wanted[1]
     return option == _text(wanted)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def ranges(traces: Iterable[Mapping[str, Draw]]) -> dict[str, Draw]:
