@@ -26,8 +26,6 @@ _LARGEST, _PART = 2, 0.2
 """Parameters without a fitting name that are tried, the longest of all; and the least share of a length that one is."""
 _VAIN = 3
 """Draws in which a parameter changes nothing until it is left alone."""
-_NOWHERE, _WIDE = 2, 4
-"""Draws in which an option leads nowhere until others are preferred; one draw of so many has all."""
 _NEAR = 0.03
 """What is left of a length's logarithm for the next step."""
 
@@ -50,8 +48,6 @@ class Search:
         self.outside: set[str] = set()
         """Names of the latter."""
         self._vain: Counter[tuple[str, str]] = Counter()
-        self._choices: dict[str, Draw] = {}
-        self._led_nowhere: Counter[tuple[str, Value]] = Counter()
 
     def at(self, draw: int) -> Found | None:
         """The plan of a draw that meets the constraints, if it comes to that."""
@@ -62,34 +58,15 @@ class Search:
         self.reached.append(made)
         self.seen.append(draws.drawn)
         changed = self._changed(draw, made, draws)
-        found = None if changed is None else self._resized(draw, *changed)
-        for name, one in draws.drawn.items():
-            if one.options or (one.kind == "yes or no" and 0.0 < one.high < 1.0):
-                self._choices[name] = one
-                self._led_nowhere[name, one.value] += 1
-        return found
+        return None if changed is None else self._resized(draw, *changed)
 
     def _planned(self, draw: int) -> Found | None:
-        asked = self.constraints.of_draws
-        others = {} if draw % _WIDE == 0 else self._others()
-        for wanted in ({**others, **asked}, asked) if others else (asked,):
-            try:
-                return self.plan(draw, wanted)
-            except UnmetError as problem:
-                if wanted is asked:
-                    self.seen.append({problem.name: problem.draw})
-                    self.outside.add(key_of(problem.name))
+        try:
+            return self.plan(draw, self.constraints.of_draws)
+        except UnmetError as problem:
+            self.seen.append({problem.name: problem.draw})
+            self.outside.add(key_of(problem.name))
         return None
-
-    def _others(self) -> dict[str, Wanted]:
-        """Of choices, the options that have not led nowhere so often, where there are some."""
-        others: dict[str, Wanted] = {}
-        for name, one in self._choices.items():
-            options: tuple[Value, ...] = one.options or (True, False)
-            left = [option for option in options if self._led_nowhere[name, option] < _NOWHERE]
-            if 0 < len(left) < len(options):
-                others[name] = frozenset(map(str, left)) if one.options else True in left
-        return others
 
     def _unmet(self, made: Assembly, draws: Draws) -> list[str]:
         """Lengths left out: they cost the most to know."""
