@@ -65,8 +65,11 @@ def save_estimator(estimator: Estimator | Stored, folder: Path, about: Mapping[s
     networks: dict[str, nn.Module] = {"perception": estimator.perception}
     if estimator.boxes is not None:
         networks["boxes"] = estimator.boxes
+    if estimator.first_look is not None:
+        networks["first_look"] = estimator.first_look
     settings = {
-        "perception": {name: getattr(estimator.perception, name) for name in ("num_rows", "width", "votes")},
+        "perception": _perception_size(estimator.perception),
+        "first_look": None if estimator.first_look is None else _perception_size(estimator.first_look),
         "boxes": None
         if estimator.boxes is None
         else {"num_rows": estimator.boxes.num_rows, "width": estimator.boxes.width},
@@ -75,6 +78,10 @@ def save_estimator(estimator: Estimator | Stored, folder: Path, about: Mapping[s
         "part_calibration": asdict(estimator.part_calibration),
     }
     _write(folder, networks, estimator.base, settings, about)
+
+
+def _perception_size(network: Perception) -> dict[str, Any]:
+    return {name: getattr(network, name) for name in ("num_rows", "width", "votes")}
 
 
 def _changes(values: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
@@ -154,6 +161,7 @@ def load_estimator(
         sizes = _Sizes(
             from_json_values(_PerceptionSize, settings.get("perception")),
             None if settings.get("boxes") is None else from_json_values(_BoxesSize, settings["boxes"]),
+            None if settings.get("first_look") is None else from_json_values(_PerceptionSize, settings["first_look"]),
         )
         told = settings.get("options")
         known = {name: told[name] for name in told if name not in _GONE} if isinstance(told, dict) else told
@@ -174,10 +182,11 @@ def load_estimator(
     base = read_shape_base(folder / _BASE)
     if base.embeddings is not None and base.embeddings.shape[1] != EMBEDDED * base.shapes.trees.num_rows:
         raise DatasetError("its embeddings are not of its objects", folder / _BASE, _AGAIN)
-    perception, boxes = networks["perception"], networks.get("boxes")
+    perception, boxes, first = networks["perception"], networks.get("boxes"), networks.get("first_look")
     assert isinstance(perception, Perception)
     assert isinstance(boxes, Boxes | None)
-    return Estimator(perception, base, options, calibration, boxes, part_calibration)
+    assert isinstance(first, Perception | None)
+    return Estimator(perception, base, options, calibration, boxes, part_calibration, first)
 
 
 def _load_stored(
@@ -272,12 +281,15 @@ class _Sizes:
 
     perception: _PerceptionSize
     boxes: _BoxesSize | None
+    first_look: _PerceptionSize | None
 
     @property
     def largest(self) -> dict[str, tuple[int, int]]:
         """Shape of a tensor of each network that is among its largest, by its name."""
-        wide = 8 * self.perception.width
-        shapes = {"perception.backbone.whole.0.weight": (wide, wide)}
+        looks = {"perception": self.perception, "first_look": self.first_look}
+        shapes = {
+            f"{name}.backbone.whole.0.weight": (8 * size.width, 8 * size.width) for name, size in looks.items() if size
+        }
         if self.boxes is not None:
             shapes["boxes.among.0.weight"] = self.boxes.width, 6 * self.boxes.width
         return shapes
@@ -287,6 +299,8 @@ class _Sizes:
         networks: dict[str, nn.Module] = {"perception": Perception(**asdict(self.perception))}
         if self.boxes is not None:
             networks["boxes"] = Boxes(**asdict(self.boxes))
+        if self.first_look is not None:
+            networks["first_look"] = Perception(**asdict(self.first_look))
         return networks
 
 
