@@ -134,7 +134,7 @@ def in_kitchens(count: int) -> list[dict[str, float]]:
     for seed in range(count):
         scene = make_scene(SceneOptions(categories=KITCHEN, place="row", distractors=0), seed)
         with tempfile.TemporaryDirectory() as place:
-            written = write_simulation(scene, Path(place))
+            written = write_simulation(scene.instances, Path(place))
             model = mujoco.MjModel.from_xml_path(str(written.folder / "scene.xml"))
         data = mujoco.MjData(model)
         mujoco.mj_resetDataKeyframe(model, data, 0)

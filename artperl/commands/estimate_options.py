@@ -31,7 +31,7 @@ class EstimateOptions:
     """Write a page for a browser here: the cloud by part, boxes, joint axes, and the way to them."""
     urdf: Path | None = None
     """Write the estimate as an object of boxes and joints into this folder, as URDF; its pose and states are in
-    meta.json."""
+    meta.json. Of an image of several objects: all of them where they are, as scene.xml, scene.usda and scene.json."""
     mjcf: Path | None = None
     """The same as MJCF, for MuJoCo; it may be the same folder."""
     usd: Path | None = None

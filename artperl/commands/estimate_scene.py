@@ -50,6 +50,8 @@ def estimate_scene(options: EstimateOptions) -> None:
     from artperl.inputs.reading import read_depth_image
     from artperl.scene.drawing import draw_scene
     from artperl.scene.estimator import SceneEstimator
+    from artperl.scene.simulation import export_scene
+    from artsim.export.folders import new_folder
 
     _check(options)
     image, depth_file = options.clouds
@@ -67,6 +69,9 @@ def estimate_scene(options: EstimateOptions) -> None:
     result = estimator(rgb, depth.values, depth.K, None if given is None else given.all)
     if options.picture is not None:
         write_output(options.picture, draw_scene(rgb, depth.K, result))
+    for folder in dict.fromkeys(own for own in (options.urdf, options.mjcf, options.usd) if own is not None):
+        with new_folder(folder) as part:
+            export_scene(result, part)
     record = scene_record(result, detections)
     if options.out == STDOUT:
         print(json.dumps(record, indent=1))

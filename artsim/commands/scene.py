@@ -87,7 +87,7 @@ class Scene(Workers):
         recipe = {"scene": self.options.recipe()["scene"], "base": self.base, "artsim_version": version("artsim")}
         for seed in track("simulations", range(self.seed, self.seed + self.scenes), unit="scene"):
             scene = make_scene(self.options.scene, seed)
-            written = write_simulation(scene, out / f"{seed:06d}", self.base, {**recipe, "seed": seed})
+            written = write_simulation(scene.instances, out / f"{seed:06d}", self.base, {**recipe, "seed": seed})
             if written.blocked:
                 say(f"{written.folder}: {len(written.blocked)} joints would meet another object somewhere: "
                     f"{', '.join(written.blocked[:6])}")  # fmt: skip

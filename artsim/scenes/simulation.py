@@ -25,7 +25,7 @@ from artsim.export.text import numbers
 from artsim.model.draws import joint_intervals
 from artsim.model.kinematics import Array
 from artsim.model.robot import Robot, as_robot
-from artsim.renderers.scene import Scene, Thing
+from artsim.renderers.scene import Thing
 
 _STEPS = 9
 """States over each joint's range in which it must be free of other objects."""
@@ -48,19 +48,23 @@ class SceneFiles:
 
 
 def write_simulation(
-    scene: Scene, folder: Path, base: Base = "fixed", recipe: Mapping[str, Any] | None = None
-) -> SceneFiles:
-    """Write a scene's articulated objects so that simulators load them with all joints free.
+    instances: Sequence[Thing], folder: Path, base: Base = "fixed", recipe: Mapping[str, Any] | None = None,
+    notes: Mapping[str, Any] | None = None,
+) -> SceneFiles:  # fmt: skip
+    """Write articulated objects where they stand, so that simulators load them with all joints free.
 
     Parameters
     ----------
-    scene : Scene
+    instances : sequence of Thing
+        Such as those of a :class:`artsim.renderers.scene.Scene`.
     folder : path
         Made if missing.
     base : Base
         Whether roots are ``fixed`` where they stand, or ``free`` to be pushed (MJCF and USD).
     recipe : mapping, optional
         What the scene follows from, in JSON's terms. A folder that was written by the same is left alone.
+    notes : mapping, optional
+        More for ``scene.json``.
 
     Raises
     ------
@@ -72,7 +76,7 @@ def write_simulation(
     found = _written(folder)
     if recipe is not None and found is not None and found.get("recipe") == recipe:
         return SceneFiles(folder, tuple(own["name"] for own in found["objects"]), tuple(found["blocked"]))
-    things = [_with_bodies(thing) for thing in scene.instances]
+    things = [_with_bodies(thing) for thing in instances]
     robots = [as_robot(thing.obj) for thing in things]
     names = tuple(f"{thing.obj.category or 'object'}_{number}" for number, thing in enumerate(things))
     for name, thing in zip(names, things, strict=True):
@@ -89,7 +93,7 @@ def write_simulation(
         }
         for name, thing, robot in zip(names, things, robots, strict=True)
     ]  # fmt: skip
-    content = {"recipe": recipe, "objects": record, "blocked": blocked}
+    content = {"recipe": recipe, "objects": record, "blocked": blocked, **(notes or {})}
     write_atomic(folder / "scene.json", (json.dumps(content, indent=1) + "\n").encode())
     return SceneFiles(folder, names, tuple(blocked))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,8 +46,9 @@ def command(folder: Path, **changes: object) -> Estimate:
 def test_all_objects_are_written_with_a_picture(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    command(folder, out=tmp_path / "out.json", picture=tmp_path / "out.png").run()
+    command(folder, out=tmp_path / "out.json", picture=tmp_path / "out.png", mjcf=tmp_path / "sim").run()
     record = json.loads((tmp_path / "out.json").read_text())
+    _check_simulation(tmp_path / "sim", [obj for obj in record["objects"] if "state" in obj])
     told = json.loads((folder / "detections.json").read_text())
     assert [obj["category"] for obj in record["objects"]] == [d["category"] for d in told]
     for obj in record["objects"]:
@@ -56,6 +58,30 @@ def test_all_objects_are_written_with_a_picture(
             assert np.shape(obj["T_camera_part"])[1:] == (4, 4)
     assert Image.open(tmp_path / "out.png").size == (320, 180)
     assert "laptop" in capsys.readouterr().out
+
+
+def _check_simulation(folder: Path, records: list[dict[str, Any]]) -> None:
+    """The scene has every estimated object in its pose and state, standing upright on the support."""
+    import mujoco
+
+    told = json.loads((folder / "scene.json").read_text())
+    model = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_kinematics(model, data)
+    T_world_camera = np.array(told["T_world_camera"])
+    assert len(told["objects"]) == len(records) > 0
+    upward = []
+    for obj, record in zip(told["objects"], records, strict=True):
+        T_part = T_world_camera @ np.array(record["T_camera_part"])
+        bodies = [model.body(n).name for n in range(model.nbody) if model.body(n).name.startswith(f"{obj['name']}/")]
+        assert len(bodies) == len(T_part)
+        for body, T in zip(bodies, T_part, strict=True):
+            np.testing.assert_allclose(data.body(body).xmat.reshape(3, 3), T[:3, :3], atol=1e-3)
+        upward.append(T_part[0, :3, 2])
+    np.testing.assert_allclose(np.mean(upward, axis=0)[:2], 0.0, atol=1e-6)
+    lowest = min(data.geom(n).xpos[2] for n in range(model.ngeom))
+    assert lowest >= 0.0
 
 
 @pytest.mark.parametrize("mode", ["RGB", "RGBA", "P", "PA", "L", "LA", "I;16", "CMYK"])

@@ -24,7 +24,7 @@ def kitchen(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path]:
     installed("pxr")
     scene = make_scene(SceneOptions(categories=KITCHEN, place="row", distractors=0), 1)
     folder = tmp_path_factory.mktemp("kitchen") / "scene"
-    assert write_simulation(scene, folder).blocked == ()
+    assert write_simulation(scene.instances, folder).blocked == ()
     return scene, folder
 
 
@@ -99,12 +99,12 @@ def test_a_joint_that_would_meet_another_object_is_named_and_what_is_written_is_
     things = tuple(Thing(obj, obj.tree.rest, T, ()) for T in (np.eye(4), before))
     scene = make_scene(SceneOptions(categories=("box",), distractors=0), 0)
     scene = Scene(things, (), scene.supports, scene.lights)
-    written = write_simulation(scene, tmp_path / "scene", recipe={"seed": 1})
+    written = write_simulation(scene.instances, tmp_path / "scene", recipe={"seed": 1})
     assert any(name.startswith("refrigerator_0/") for name in written.blocked)
     assert not any(name.startswith("refrigerator_1/door") for name in written.blocked)
     stamp = (tmp_path / "scene" / "scene.xml").stat().st_mtime_ns
-    assert write_simulation(scene, tmp_path / "scene", recipe={"seed": 1}) == written
+    assert write_simulation(scene.instances, tmp_path / "scene", recipe={"seed": 1}) == written
     assert (tmp_path / "scene" / "scene.xml").stat().st_mtime_ns == stamp
-    write_simulation(scene, tmp_path / "scene", "free", {"seed": 2})
+    write_simulation(scene.instances, tmp_path / "scene", "free", {"seed": 2})
     assert json.loads((tmp_path / "scene" / "scene.json").read_text())["recipe"] == {"seed": 2}
     assert (tmp_path / "scene" / "scene.xml").read_text().count("<freejoint") == 2
