@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import product
 from typing import Protocol
 
 import numpy as np
@@ -15,12 +16,20 @@ from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, r
 from artsim.making.solids import box, union
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
-from artsim.model.transforms import compose_transform
+from artsim.model.transforms import compose_transform, rotation_about
 
 _GAP = 0.004
 """Diagonals between a part and what lies in its openings; and the thinnest wall that is left."""
+_TURNS, _PER_TURN = 12, 8
+"""Parts of a turn's range, and states in each: arcs between these leave the box by less than the gap."""
+_HARDLY = 1.5
+"""Times the volume of the largest: many small rooms of a knob are one."""
 _DENSITY = 300.0
 """kg/m^3 of what is known as a box alone: furniture and appliances, hollow, have about as much."""
+
+
+Box = tuple[Array, Array]
+"""Lower and upper corner (3,)."""
 
 
 class Parts(Protocol):
@@ -53,8 +62,8 @@ def estimated_object(estimate: Parts, category: str = "object", name: str = "est
 ]:  # fmt: skip
     """The object that an estimate describes, where it is, and its joint states.
 
-    A part is its box, less the boxes of later parts that reach into it: a cabinet has an opening for each drawer. A
-    screw, of whose thread an estimate knows nothing, becomes a hinge.
+    A part is its box, less where later parts reach into it while they move: a cabinet has an opening for each drawer,
+    and room for the back edge of a door. A screw, of whose thread an estimate knows nothing, becomes a hinge.
 
     Parameters
     ----------
@@ -84,24 +93,75 @@ def estimated_object(estimate: Parts, category: str = "object", name: str = "est
     low, high = center - 0.5 * estimate.size, center + 0.5 * estimate.size
     gap = _GAP * float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))
     names = _names(estimate)
+    parents = [int(parent) for parent in estimate.joint_parent]
     made, q = Assembly(density=_DENSITY), np.zeros(len(T))
-    filled: list[tuple[Array, Array]] = []
+    joints: list[JointSpec | None] = [None]
+    for k in range(1, len(names)):
+        spec, q[k] = _joint(estimate, k, names[int(estimate.joint_parent[k])], axes[k], origins[k])
+        joints.append(spec)
+    filled: list[Box] = []
     for k, part in enumerate(names):
-        inside = [(low[j] - gap, high[j] + gap) for j in range(k + 1, len(names))]
+        inside = [
+            room for j in range(k + 1, len(names))
+            for room in _rooms((low[k], high[k]), _reached(j, _meet(parents, j, k), parents, joints, (low, high)), gap)
+        ]  # fmt: skip
         own = boxes_without(low[k], high[k], inside, gap)
-        joint = None
-        if k > 0:
-            joint, q[k] = _joint(estimate, k, names[int(estimate.joint_parent[k])], axes[k], origins[k])
-        made.add(part, union(box(start, end) for start, end in own), joint, label=re.sub(r"_[0-9]+$", "", part))
+        made.add(part, union(box(start, end) for start, end in own), joints[k], label=re.sub(r"_[0-9]+$", "", part))
         filled += own
     ends = np.array(filled)
     middle = 0.5 * (ends[:, 0].min(axis=0) + ends[:, 1].max(axis=0))
     return made.build(category, name), matmul(T[0], compose_transform(middle)), q
 
 
-def boxes_without(
-    low: Array, high: Array, others: Sequence[tuple[Array, Array]], least: float
-) -> list[tuple[Array, Array]]:
+def _meet(parents: Sequence[int], j: int, k: int) -> int:
+    """The nearest part that both j and k hang from, or are."""
+    above = [k]
+    while above[-1] > 0:
+        above.append(parents[above[-1]])
+    while j not in above:
+        j = parents[j]
+    return j
+
+
+def _reached(
+    j: int, top: int, parents: Sequence[int], joints: Sequence[JointSpec | None], ends: Box
+) -> list[Box]:  # fmt: skip
+    """Boxes that hold part j in all states of the joints between it and the part ``top``, which rests."""
+    boxes, k = [(ends[0][j], ends[1][j])], j
+    while k != top:
+        whole = np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
+        joint = joints[k]
+        assert joint is not None
+        boxes, k = swept(whole, joint), parents[k]
+    return boxes
+
+
+def swept(box: Box, joint: JointSpec) -> list[Box]:
+    """Boxes that hold a box in all states of a joint: one for a slide, one for each twelfth of a turn's range."""
+    lower, upper = (joint.lower, joint.upper) if np.isfinite(joint.upper - joint.lower) else (-np.pi, np.pi)
+    axis, corners = np.asarray(joint.axis), np.array(list(product(*zip(*box, strict=True))))
+    if joint.type == "prismatic":
+        moved = np.stack([corners + lower * axis, corners + upper * axis])[None]
+    else:
+        states = np.linspace(lower, upper, _TURNS * _PER_TURN + 1)
+        turns = np.stack([rotation_about(axis, state) for state in states])
+        every = (corners - joint.origin) @ np.swapaxes(turns, 1, 2) + joint.origin
+        moved = np.stack([every[n * _PER_TURN : (n + 1) * _PER_TURN + 1] for n in range(_TURNS)])
+    return [(own.min(axis=(0, 1)), own.max(axis=(0, 1))) for own in moved]
+
+
+def _rooms(box: Box, others: Sequence[Box], gap: float) -> list[Box]:
+    """What is to be taken from a box for others: one room for all where it is hardly larger than the largest."""
+    own = [(np.maximum(a - gap, box[0]), np.minimum(b + gap, box[1])) for a, b in others]
+    own = [(a, b) for a, b in own if (a < b).all()]
+    if not own:
+        return []
+    one = np.min([a for a, _ in own], axis=0), np.max([b for _, b in own], axis=0)
+    largest = max(float(np.prod(b - a)) for a, b in own)
+    return [one] if float(np.prod(one[1] - one[0])) <= _HARDLY * largest else own
+
+
+def boxes_without(low: Array, high: Array, others: Sequence[Box], least: float) -> list[Box]:
     """Boxes that fill a box (low, high) less others; slivers thinner than ``least`` are left out.
 
     The whole box, where the others leave nothing of it.
