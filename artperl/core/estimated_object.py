@@ -162,7 +162,7 @@ def _rooms(box: Box, others: Sequence[Box], gap: float) -> list[Box]:
 
 
 def boxes_without(low: Array, high: Array, others: Sequence[Box], least: float) -> list[Box]:
-    """Boxes that fill a box (low, high) less others; slivers thinner than ``least`` are left out.
+    """Boxes that fill a box (low, high) less others; what is thinner than ``least``, of either, is passed over.
 
     The whole box, where the others leave nothing of it.
     """
@@ -170,7 +170,7 @@ def boxes_without(low: Array, high: Array, others: Sequence[Box], least: float) 
     for a, b in others:
         parts = []
         for one, two in left:
-            if (a >= two).any() or (b <= one).any():
+            if (a >= two - least).any() or (b <= one + least).any():
                 parts.append((one, two))
                 continue
             one, two = one.copy(), two.copy()

@@ -56,7 +56,8 @@ def test_parts_stand_where_they_were_estimated_in_mujoco(category: str, tmp_path
         np.testing.assert_allclose(center[:3], estimate.translation[k], atol=opened + 1e-6)
         np.testing.assert_allclose(T_camera_object[:3, :3] @ body.xmat.reshape(3, 3), estimate.rotation[k], atol=1e-6)
     failed = {gate.name for gate in check_file(obj, tmp_path) if not gate.passed}
-    assert failed <= {"collision free"}  # boxes of siblings that pass each other meet
+    # Boxes of siblings that pass each other meet; that of a fan's head encloses its neck.
+    assert failed <= {"collision free", *(["joined parts apart"] if category == "fan" else [])}
 
 
 def test_boxes_of_parts_do_not_overlap_at_rest() -> None:
