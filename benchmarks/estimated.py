@@ -33,7 +33,7 @@ from artsim.physics.simulators import SIMULATORS
 class Options:
     """Which estimator, and how many objects."""
 
-    estimator: str = "cabinet"
+    estimator: str = "generic"
     categories: tuple[str, ...] = (
         "storage_furniture", "table", "refrigerator", "safe", "microwave", "oven", "dishwasher", "washing_machine",
         "door", "toilet", "trash_can", "laptop",

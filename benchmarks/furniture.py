@@ -11,7 +11,11 @@ counts once, by the first of these that holds:
   that is turned by more than 10 degrees, or whose box is elsewhere.
 
 ``--told`` says what an estimate would reach if perception said one thing right: *level* (which points are of the root,
-of what hangs on it ...), *box*, *joint*, or all three (*votes*). The last line is one JSON object.
+of what hangs on it ...), *box*, *joint*, or all three (*votes*). *found* is the mean share of parts that are right, of
+all that there are or are said to be. The last line is one JSON object.
+
+``artperl train --recipe benchmarks/cabinet.json --out out/cabinet`` trains an estimator of furniture and appliances
+from the front alone, which looks twice; ``--estimator out/cabinet/best`` measures it.
 """
 
 import json
@@ -36,7 +40,7 @@ from artperl.data.truth import to_batch, training_rows
 from artperl.evaluation.benchmark import find_estimator
 from artperl.evaluation.metrics import direction_error, rotation_error, translation_error, true_poses
 from artperl.evaluation.samples import TEST_SEEDS, samples_of
-from artperl.evaluation.scoring import LooksSame, match_parts, object_symmetries
+from artperl.evaluation.scoring import LooksSame, found_share, match_parts, object_symmetries
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perceived, Votes
 from artsim.checks.realism import read_split, real_objects
@@ -155,13 +159,16 @@ def measure(estimator: Estimator, samples: Sequence[Sample], same: dict[str, Loo
     """Shares of causes, of views with every part right, and of views with another number of parts."""
     counts: Counter[str] = Counter()
     whole = number = 0
+    found = 0.0
     for sample in track(f"{samples[0].category}, told {told}", samples, unit="view", leave=False):
         asked = estimator if told == "nothing" else Oracle(**vars(estimator), sample=sample, told=told)
         try:
             estimate = asked(sample.points)
         except ArtsimError:
             estimate = None
-        own = causes(estimate, sample, same.get(sample.object_sha256, LooksSame()))
+        alike_ways = same.get(sample.object_sha256, LooksSame())
+        own = causes(estimate, sample, alike_ways)
+        found += 0.0 if estimate is None else found_share(match_parts(estimate, sample, alike_ways), sample)
         counts.update(own)
         alike = estimate is not None and len(estimate.state) == len(sample.joint_type)
         number += not alike
@@ -169,15 +176,15 @@ def measure(estimator: Estimator, samples: Sequence[Sample], same: dict[str, Loo
     total = max(sum(counts.values()), 1)
     shares = {cause: round(100 * counts[cause] / total, 1) for cause in CAUSES if counts[cause]}
     views = len(samples)
-    return {"parts": total, "views": views, **shares, "views right": round(100 * whole / views, 1),
-            "other number": round(100 * number / views, 1)}  # fmt: skip
+    return {"parts": total, "views": views, **shares, "found": round(100 * found / views, 1),
+            "views right": round(100 * whole / views, 1), "other number": round(100 * number / views, 1)}  # fmt: skip
 
 
 def main(options: Options) -> None:
     """Measure and print."""
     estimator = find_estimator(None, options.estimator)
     result: dict[str, dict[str, Any]] = defaultdict(dict)
-    columns = ("parts", *CAUSES, "views right", "other number")
+    columns = ("parts", *CAUSES, "found", "views right", "other number")
     print(f"{'%':20s}{'told':9s}" + "".join(f"{name:>13s}" for name in columns))
     for category in options.categories:
         samples, same = tested(category, options)
