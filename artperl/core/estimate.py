@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 from torch import Tensor
 
@@ -183,19 +183,31 @@ def cells(estimate: Estimate) -> list[tuple[str, ...]]:
     """What `HEAD` names, of each part."""
     rows: list[tuple[str, ...]] = []
     for k, kind in enumerate(estimate.joint_type):
-        turn = Rotation.from_matrix(estimate.rotation[k]).as_rotvec(degrees=True)
-        low, high = estimate.joint_limits[k] if k < len(estimate.joint_limits) else (np.nan, np.nan)
-        rows.append((
-            estimate.part_names[k] if k < len(estimate.part_names) else f"{k}", kind,
-            "" if kind in ("free", "fixed") else _amount(kind, estimate.state[k]),
-            "" if kind in ("free", "fixed") or not np.isfinite([low, high]).all()
-            else f"{_amount(kind, low)} to {_amount(kind, high)}",
-            " ".join(f"{x:.3f}" for x in estimate.translation[k]),
-            " ".join(f"{x:.1f}" for x in turn), " x ".join(f"{x:.3f}" for x in estimate.size[k]),
-            f"{100 * estimate.visibility[k]:.0f} %",
-            f"{100 * estimate.part_confidence[k]:.0f} %" if k < len(estimate.part_confidence) else "",
-        ))  # fmt: skip
+        name = estimate.part_names[k] if k < len(estimate.part_names) else f"{k}"
+        limits = estimate.joint_limits[k] if k < len(estimate.joint_limits) else (np.nan, np.nan)
+        joint = joint_cells(kind, float(estimate.state[k]), limits)
+        pose = pose_cells(estimate.rotation[k], estimate.translation[k], estimate.size[k])
+        sure = f"{100 * estimate.part_confidence[k]:.0f} %" if k < len(estimate.part_confidence) else ""
+        rows.append((name, kind, *joint, *pose, f"{100 * estimate.visibility[k]:.0f} %", sure))
     return rows
+
+
+def joint_cells(kind: str, state: float, limits: ArrayLike) -> tuple[str, str]:
+    """State and limits (2,) of a joint in words; empty for what does not move, or has no limits."""
+    if kind in ("free", "fixed"):
+        return "", ""
+    low, high = np.asarray(limits, np.float64)
+    ends = f"{_amount(kind, low)} to {_amount(kind, high)}" if np.isfinite([low, high]).all() else ""
+    return _amount(kind, state), ends
+
+
+def pose_cells(rotation: Array, center: Array, size: Array) -> tuple[str, str, str]:
+    """Box centre (3,), rotation (3, 3) and box size (3,) of a part, as `HEAD` names them."""
+    turn = Rotation.from_matrix(rotation).as_rotvec(degrees=True)
+    return (
+        " ".join(f"{x:.3f}" for x in center), " ".join(f"{x:.1f}" for x in turn),
+        " x ".join(f"{x:.3f}" for x in size),
+    )  # fmt: skip
 
 
 def _amount(kind: str, state: float) -> str:

@@ -3,6 +3,8 @@
 import hashlib
 import io
 import re
+from collections import Counter
+from collections.abc import Sequence
 from typing import TextIO
 
 _MAX_NAME = 60
@@ -94,6 +96,16 @@ def unused_name(name: str, used: set[str]) -> str:
         name += "_"
     used.add(name)
     return name
+
+
+def numbered(names: Sequence[str]) -> list[str]:
+    """The names, those that occur more than once with a number: ``body, drawer 1, drawer 2``."""
+    total, seen = Counter(names), Counter[str]()
+    texts = []
+    for name in names:
+        seen[name] += 1
+        texts.append(f"{name} {seen[name]}" if total[name] > 1 else name)
+    return texts
 
 
 def is_number(text: str) -> bool:

@@ -14,7 +14,7 @@ from artsim.common.names import printable, safe_name
 from artsim.common.outputs import check_output, write_output
 from artsim.common.palette import PALETTE
 from artsim.datasets.dataset import Dataset
-from artsim.errors import ArtsimError
+from artsim.errors import ArtsimError, AssetError
 from artsim.loading.urdf import load
 from artsim.model.draws import StateOptions, ViewOptions, joint_intervals, sample_state, sample_view
 from artsim.model.frame import BACKGROUND
@@ -46,15 +46,14 @@ def write_contact_sheet(
     list of Path
         The files written.
     """
-    if (path / "dataset.json").is_file() or (path / "plan.json").is_file():
-        dataset = Dataset(path, split)
-        chosen = spread(len(dataset), samples)
-        shown = [show_sample(sample, dataset.object_of(sample)) for sample in (dataset[i] for i in chosen)]
+    opened = open_shown(path, split, package_roots, body)
+    if isinstance(opened, Dataset):
+        chosen = spread(len(opened), samples)
+        shown = [show_sample(sample, opened.object_of(sample)) for sample in (opened[i] for i in chosen)]
         out = out or path / "contact_sheet.png"
     else:
-        obj = load(path, package_roots=package_roots, body=body)
-        shown = list(show_states(obj, samples))
-        out = out or Path(f"{safe_name(f'{obj.category}-{obj.object_id}')}.png")
+        shown = list(show_states(opened, samples))
+        out = out or Path(f"{safe_name(f'{opened.category}-{opened.object_id}')}.png")
     if not shown:
         raise ArtsimError("there is no sample to draw", path, "choose another split, or ask for at least one")
     write_output(out, contact_sheet(shown), [path])
@@ -66,6 +65,26 @@ def write_contact_sheet(
         write_recording(shown, rerun)
         written.append(rerun)
     return written
+
+
+def open_shown(
+    path: Path, split: str | None = None, package_roots: Mapping[str, Path] | None = None, body: str | None = None
+) -> Dataset | ArticulatedObject:
+    """What is looked at: the dataset of a folder, or an object; see :func:`artsim.loading.urdf.load`.
+
+    Raises
+    ------
+    ArtsimError
+        When it is neither.
+    """
+    if (path / "dataset.json").is_file() or (path / "plan.json").is_file():
+        return Dataset(path, split)
+    try:
+        return load(path, package_roots=package_roots, body=body)
+    except AssetError as error:
+        if path.is_file() or error.where != str(path):  # an object that is there is at fault
+            raise
+        raise AssetError(error.what, path, f"{error.fix}; or the folder of a dataset") from error
 
 
 def spread(total: int, count: int) -> list[int]:

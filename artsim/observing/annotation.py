@@ -39,11 +39,25 @@ def box_corners(sample: Sample, k: int) -> Array:
 
 def axis_segment(sample: Sample, k: int) -> tuple[Array, Array]:
     """Start and end of an arrow along joint k's axis, camera frame: about a third of the object long."""
-    axis, origin = sample.joint_axis_camera[k], sample.joint_origin_camera[k]
-    # The origin may lie anywhere on the axis, and a slide has no line of its own: draw where the part is.
     center = transform_points(sample.T_camera_part[k], sample.box_center[k][None])[0]
-    middle = center if sample.joint_type[k] == "prismatic" else origin + axis * ((center - origin) @ axis)
-    half = 0.18 * sample.diagonal * axis
+    axis, origin = sample.joint_axis_camera[k], sample.joint_origin_camera[k]
+    return segment_at(sample.joint_type[k], axis, origin, center, sample.diagonal)
+
+
+def segment_at(kind: str, axis: Array, origin: Array, center: Array, diagonal: float) -> tuple[Array, Array]:
+    """Start and end of an arrow along a joint's axis, beside the centre of the part that it moves.
+
+    Parameters
+    ----------
+    kind : str
+    axis, origin, center : (3,) float
+        Of the joint, and of the part's box, metres, in one frame.
+    diagonal : float
+        Of the object, metres.
+    """
+    # The origin may lie anywhere on the axis, and a slide has no line of its own: draw where the part is.
+    middle = center if kind == "prismatic" else origin + axis * ((center - origin) @ axis)
+    half = 0.18 * diagonal * axis
     return middle - half, middle + half
 
 

@@ -116,16 +116,6 @@ class Sample(Showable):
     detail: NDArray[np.uint8] | None = None
 
     def __str__(self) -> str:
-        rows: list[tuple[str, ...]] = [
-            ("part", "name", "joint", "points", "visible", "state", "from", "to", "size, cm")
-        ]
-        counts = np.bincount(self.part, minlength=len(self.joint_type))
-        for k, kind in enumerate(self.joint_type):
-            values = (self.joint_state[k], *self.joint_limits[k]) if k else ()
-            state, low, high = (joint_value(float(value), kind) for value in values) if k else ("", "", "")
-            visible = f"{100 * self.visible_fraction[k]:.0f} %"
-            shown = (str(k), label_of(self.part_names[k]), kind, f"{counts[k]:,}", visible, state, low, high)
-            rows.append((*shown, centimetres(self.box_size[k])))
         origin = f"sample {self.index} of seed {self.seed}" if self.index >= 0 else "a view that was asked for"
         images = [image for image in ("depth", "part_mask", "rgb") if getattr(self, image) is not None]
         distance = norm(self.T_camera_part[0, :3, 3])  # of the middle of the object at rest
@@ -137,7 +127,7 @@ class Sample(Showable):
                 f"{inside}, diagonal {three_digits(100 * self.diagonal)} cm, {distance:.2f} m from the camera",
                 cut(f"camera {self.width} x {self.height}, {made}"),
                 "",
-                *table(rows, left=3),
+                *table(part_rows(self), left=3),
             ]
         )
 
@@ -180,3 +170,16 @@ class Sample(Showable):
         diagonal, part = norm(self.box_size), np.where(np.isnan(self.npcs[:, 0]), 0, self.part)
         rest: Array = (self.npcs - 0.5) * diagonal[part, None] + self.box_center[part]
         return rest
+
+
+def part_rows(sample: Sample) -> list[tuple[str, ...]]:
+    """A heading, and a row for each part: number, name, joint, points, how much is seen, state, limits and size."""
+    rows: list[tuple[str, ...]] = [("part", "name", "joint", "points", "visible", "state", "from", "to", "size, cm")]
+    counts = np.bincount(sample.part, minlength=len(sample.joint_type))
+    for k, kind in enumerate(sample.joint_type):
+        values = (sample.joint_state[k], *sample.joint_limits[k]) if k else ()
+        state, low, high = (joint_value(float(value), kind) for value in values) if k else ("", "", "")
+        visible = f"{100 * sample.visible_fraction[k]:.0f} %"
+        shown = (str(k), label_of(sample.part_names[k]), kind, f"{counts[k]:,}", visible, state, low, high)
+        rows.append((*shown, centimetres(sample.box_size[k])))
+    return rows
