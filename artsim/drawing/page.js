@@ -366,9 +366,10 @@ function turnBy(azimuth, elevation) {
 }
 function zoomBy(factor) { eye.zoom = Math.min(Math.max(eye.zoom * factor, 0.02), 20); render(); }
 function shiftBy(across, down) { eye.shift = [eye.shift[0] + across * eye.zoom, eye.shift[1] - down * eye.zoom]; render(); }
+const narrowest = aspect => Math.atan(Math.tan(FIELD / 2) * Math.min(1, aspect));  // half of the angle that is seen
 function placeCamera(aspect) {
   const {up, ahead, aside} = basis(), {center, radius} = frame.view, size = Math.max(radius, 1e-6);
-  const half = Math.atan(Math.tan(FIELD / 2) * Math.min(1, aspect)), distance = eye.zoom * size / Math.sin(half);
+  const distance = eye.zoom * size / Math.sin(narrowest(aspect));
   const flat = Math.cos(eye.elevation);
   camera.position.copy(vector(center))
     .addScaledVector(ahead, distance * flat * Math.cos(eye.azimuth))
@@ -423,7 +424,10 @@ function listen(canvas) {
     return {x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, apart: Math.hypot(a.x - b.x, a.y - b.y)};
   };
   const pixels = () => panes()[0].h;
-  const radii = () => 2 * Math.tan(FIELD / 2) / Math.sin(FIELD / 2) / pixels();  // that a pixel is wide at zoom 1
+  const radii = () => {  // that a pixel is wide at zoom 1
+    const {w, h} = panes()[0];
+    return 2 * Math.tan(FIELD / 2) / Math.sin(narrowest(w / h)) / h;
+  };
   canvas.addEventListener("pointerdown", event => {
     canvas.setPointerCapture(event.pointerId);
     pointers.set(event.pointerId, {x: event.clientX, y: event.clientY, turns: event.button === 0 && !event.shiftKey});
