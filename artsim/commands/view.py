@@ -6,6 +6,7 @@ from pathlib import Path
 import tyro
 
 from artsim.commands.having import Having, categories_named
+from artsim.errors import ConfigError
 from artsim.families.constraints import Constraints
 from artsim.loading.roots import Opened
 
@@ -16,6 +17,7 @@ class View(Opened):
 
     Writes a contact sheet (PNG: depth, part colours, boxes, joint axes). With --rerun, a recording for the rerun
     viewer comes with it. With --html, it writes a page for any browser instead: sliders for joints, boxes, clouds.
+    With --serve, a page on this machine finds samples in a dataset of any size, and loads them as they are looked at.
     """
 
     path: tyro.conf.Positional[Path]
@@ -30,8 +32,20 @@ class View(Opened):
     """Also write a rerun recording (.rrd) to this file."""
     html: Path | None = None
     """Page to write, such as laptop.html; it needs no network and no other file."""
+    serve: bool = False
+    """Show all samples of a dataset at an address of this machine until Ctrl-C."""
+    port: int = 0
+    """Port of --serve; 0 takes a free one."""
 
     def run(self) -> None:
+        for path, kind in ((self.out, ".png"), (self.html, ".html"), (self.rerun, ".rrd")):
+            if path is not None and path.suffix.lower() != kind:
+                raise ConfigError(f"it is no {kind} file", path, f"name it {path.stem or 'page'}{kind}")
+        if self.serve:
+            from artsim.drawing.serve import serve
+
+            serve(self.path, self.split, self.port)
+            return
         from artsim.drawing.contact_sheet import write_contact_sheet
         from artsim.drawing.page import write_page
 

@@ -127,6 +127,18 @@ def test_the_program_writes_pages_of_objects_and_datasets(tmp_path: Path) -> Non
     assert sorted(path.name for path in tmp_path.iterdir()) == ["laptop.html", "set", "set.html"]
 
 
+def test_what_is_no_dataset_no_object_or_no_picture_is_said(tmp_path: Path) -> None:
+    for path in (tmp_path / "nothing", tmp_path):
+        with pytest.raises(ArtsimError, match="or the folder of a dataset"):
+            View(path, html=tmp_path / "a.html").run()
+    for wrong in ({"out": tmp_path / "README.md"}, {"html": tmp_path / "README.md"}, {"rerun": tmp_path / "README.md"}):
+        with pytest.raises(ArtsimError, match=r"README\.md: it is no \.\w+ file\. Fix: name it README\."):
+            View(ASSETS / "laptop", **wrong).run()
+    with pytest.raises(ArtsimError, match="no dataset here"):
+        View(ASSETS / "laptop", serve=True).run()
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_page_of_nothing_is_refused() -> None:
     with pytest.raises(ArtsimError, match="no sample"):
         sample_page([])
