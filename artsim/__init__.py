@@ -110,6 +110,6 @@ _HOMES = {
     "vary": "variation",
     "__version__": "observing.sample",
 }
-_PACKAGES = ("checks", "drawing", "envs", "export", "formats", "physics", "renderers", "scenes", "stream")
+_PACKAGES = ("checks", "drawing", "envs", "export", "formats", "physics", "scenes", "stream")
 __getattr__, __dir__ = lazy_names(__name__, _HOMES, _PACKAGES)
 PAGE_MODULES.append("artsim.drawing.page")

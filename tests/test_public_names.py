@@ -18,7 +18,7 @@ from tests.conftest import ROOT, installed
 PAGE = (ROOT / "docs" / "api.md").read_text()
 NAMES = sorted(set(re.findall(r"`(art(?:sim|perl)\.[\w.]+)`", PAGE)))
 PACKAGES = re.findall(r"^## (art\w+(?:\.\w+)*)$", PAGE, re.MULTILINE)
-EXTRAS = {"artsim.envs": "gymnasium", "artperl.Estimate": "torch"}
+EXTRAS = {"artsim.envs": "gymnasium"} | {name: "torch" for name in NAMES if re.fullmatch(r"artperl\.\w+", name)}
 """What must be installed for a name besides the core."""
 
 
@@ -43,6 +43,14 @@ def test_public_name_imports_and_is_documented(name: str) -> None:
 def test_page_lists_every_name_of_a_public_package(package: str) -> None:
     assert {f"{package}.{name}" for name in import_package(package).__all__} == {
         name for name in NAMES if name.rpartition(".")[0] == package
+    }
+
+
+@pytest.mark.parametrize("package", ["artsim", "artperl"])
+def test_completion_offers_public_names_alone(package: str) -> None:
+    module = importlib.import_module(package)
+    assert {name for name in dir(module) if name not in module.__all__} <= {
+        re.sub(r"^\w+\.", "", name) for name in PACKAGES if name.startswith(f"{package}.")
     }
 
 

@@ -69,7 +69,7 @@ class Evaluate:
         told: dict[str, Any] = {} if self.seen_from is None else {"seen_from": self.seen_from}
         estimator = load_estimator(self.estimator, method=self.method, **told)
         stored = self.method in STORED_METHODS
-        learnt = read_settings(folder_of(self.estimator))["about"]["options"] if stored else {}
+        learnt = read_settings(folder_of(self.estimator))["about"].get("options", {}) if stored else {}
         options = SampleOptions(
             self.num_points, states=StateOptions(self.states), views=ViewOptions(preset=self.preset), noise=self.noise
         )

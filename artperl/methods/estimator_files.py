@@ -6,7 +6,6 @@ Weights are kept in half precision. Nothing in the folder is executed when it is
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -18,17 +17,17 @@ from torch import Tensor, nn
 from artperl.boxes.network import Boxes
 from artperl.core.confidence import Calibration, PartCalibration
 from artperl.core.device import find_device
-from artperl.core.tensor_files import MAX_BYTES, read_tensors, write_tensors
+from artperl.core.tensor_files import MAX_BYTES, read_tensors
 from artperl.core.threads import single_precision
 from artperl.fitting.options import EstimatorOptions
 from artperl.methods import STORED_METHODS, method_of
+from artperl.methods.estimator_writing import BASE, FORMAT, SETTINGS, TENSORS
 from artperl.methods.full import Estimator
 from artperl.methods.protocol import Stored, Untrained
 from artperl.perception.network import Perception
 from artperl.retrieval.box_embedding import EMBEDDED
-from artperl.retrieval.shape_base import ShapeBase
-from artperl.retrieval.shape_base_file import read_shape_base, write_shape_base
-from artsim.common.files import read_bounded, read_json, write_atomic
+from artperl.retrieval.shape_base_file import read_shape_base
+from artsim.common.files import read_bounded, read_json
 from artsim.common.json_records import from_json_values
 from artsim.common.names import printable
 from artsim.errors import ConfigError, DatasetError
@@ -40,91 +39,32 @@ if TYPE_CHECKING:
 WEIGHTS = Path(__file__).parents[1] / "weights"
 """Folder of the estimators that come with the package."""
 
-_FORMAT = 4
 _AGAIN = "train it again"
-_SETTINGS, _TENSORS, _BASE = "estimator.json", "weights.safetensors", "base.npz"
 _GONE = {"occluded_parts"}
 """Options that files of former versions may name: they are passed over."""
 
 
-def save_estimator(estimator: Estimator | Stored, folder: Path, about: Mapping[str, Any]) -> None:
-    """Write an estimator.
-
-    Parameters
-    ----------
-    estimator : Estimator or Stored
-    folder : Path
-        Made if missing; files in it are replaced one by one.
-    about : mapping
-        Anything else worth knowing, in JSON's terms: what it was trained on, and how well it does.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    if not isinstance(estimator, Estimator):
-        _write(folder, estimator.networks(), estimator.base, {"method": estimator.name, **estimator.settings()}, about)
-        return
-    networks: dict[str, nn.Module] = {"perception": estimator.perception}
-    if estimator.boxes is not None:
-        networks["boxes"] = estimator.boxes
-    if estimator.first_look is not None:
-        networks["first_look"] = estimator.first_look
-    settings = {
-        "perception": _perception_size(estimator.perception),
-        "first_look": None if estimator.first_look is None else _perception_size(estimator.first_look),
-        "boxes": None
-        if estimator.boxes is None
-        else {"num_rows": estimator.boxes.num_rows, "width": estimator.boxes.width},
-        "options": _changes(asdict(estimator.options), asdict(EstimatorOptions())),
-        "calibration": asdict(estimator.calibration),
-        "part_calibration": asdict(estimator.part_calibration),
-    }
-    _write(folder, networks, estimator.base, settings, about)
-
-
-def _perception_size(network: Perception) -> dict[str, Any]:
-    return {name: getattr(network, name) for name in ("num_rows", "width", "votes")}
-
-
-def _changes(values: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
-    """The values that differ from their defaults, at every depth: an option that goes leaves no trace in files."""
-    return {
-        name: _changes(value, defaults[name]) if isinstance(value, dict) else value
-        for name, value in values.items()
-        if value != defaults[name]
-    }
-
-
-def _write(
-    folder: Path, networks: Mapping[str, nn.Module], base: ShapeBase, settings: Mapping[str, Any],
-    about: Mapping[str, Any],
-) -> None:  # fmt: skip
-    tensors = {f"{name}.{key}": t.half() for name, net in networks.items() for key, t in net.state_dict().items()}
-    write_tensors(tensors, folder / _TENSORS)
-    write_shape_base(base, folder / _BASE)
-    told = {"format": _FORMAT, **settings, "about": dict(about)}
-    write_atomic(folder / _SETTINGS, (json.dumps(told) + "\n").encode())
-
-
 @overload
 def load_estimator(
-    name: str | Path, device: torch.device | str = "cpu", method: Literal["full"] = "full", **changes: Any
+    name: str | Path, method: Literal["full"] = "full", device: torch.device | str = "cpu", **changes: Any
 ) -> Estimator: ...
 
 
 @overload
 def load_estimator(
-    name: str | Path, device: torch.device | str = "cpu", *, method: Literal["artperl"], **changes: Any
+    name: str | Path, method: Literal["artperl"], device: torch.device | str = "cpu", **changes: Any
 ) -> ArtPERL: ...
 
 
 @overload
 def load_estimator(
-    name: str | Path, device: torch.device | str = "cpu", *, method: str, **changes: Any
+    name: str | Path, method: str, device: torch.device | str = "cpu", **changes: Any
 ) -> Estimator | Stored | Untrained: ...
 
 
 @single_precision()
 def load_estimator(
-    name: str | Path, device: torch.device | str = "cpu", method: str = "full", **changes: Any
+    name: str | Path, method: str = "full", device: torch.device | str = "cpu", **changes: Any
 ) -> Estimator | Stored | Untrained:
     """An estimator by its folder, or one that comes with the package by its name, such as "laptop".
 
@@ -132,12 +72,15 @@ def load_estimator(
     ----------
     name : str or Path
         For a method that needs no training, a category.
+    method : str
+        full, which comes with the package; artperl (the paper's), which does for the categories of ArtImage; ancsh,
+        omad or sporeagent, which you train yourself: a folder of your own; or one that you add to
+        :data:`artperl.methods.METHODS`.
     device : torch.device or str
         Where it works, such as "cuda".
-    method : str
-        Name of the method, of :data:`artperl.methods.METHODS`.
     **changes
-        Of its :class:`~artperl.fitting.options.EstimatorOptions`, such as ``seen_from=(-75.0, 75.0)``.
+        Of its options, such as ``seen_from=(-75.0, 75.0)``, degrees, where the camera is known to be in front of the
+        object. :class:`artperl.fitting.options.EstimatorOptions` has them all.
 
     Raises
     ------
@@ -169,8 +112,8 @@ def load_estimator(
         calibration = from_json_values(Calibration, settings.get("calibration"))
         part_calibration = from_json_values(PartCalibration, settings.get("part_calibration"))
     except ValueError as error:
-        raise DatasetError(f"{_SETTINGS} is damaged: {error}", folder, _AGAIN) from error
-    tensors, _ = read_tensors(folder / _TENSORS, "the file of weights", _AGAIN)
+        raise DatasetError(f"{SETTINGS} is damaged: {error}", folder, _AGAIN) from error
+    tensors, _ = read_tensors(folder / TENSORS, "the file of weights", _AGAIN)
     for key, shape in sizes.largest.items():  # a forged width takes no memory before it is that of the weights
         if key not in tensors or tensors[key].shape != shape:
             raise DatasetError(f"the estimator does not load: {key} is not of shape {shape}", folder, _AGAIN)
@@ -179,9 +122,9 @@ def load_estimator(
     for key, network in networks.items():
         network.load_state_dict(_under(tensors, f"{key}."))
         network.to(device)
-    base = read_shape_base(folder / _BASE)
+    base = read_shape_base(folder / BASE)
     if base.embeddings is not None and base.embeddings.shape[1] != EMBEDDED * base.shapes.trees.num_rows:
-        raise DatasetError("its embeddings are not of its objects", folder / _BASE, _AGAIN)
+        raise DatasetError("its embeddings are not of its objects", folder / BASE, _AGAIN)
     perception, boxes, first = networks["perception"], networks.get("boxes"), networks.get("first_look")
     assert isinstance(perception, Perception)
     assert isinstance(boxes, Boxes | None)
@@ -196,7 +139,7 @@ def _load_stored(
     folder = folder_of(name, kind.name)
     if changes:
         raise ConfigError(f"the method {kind.name} has no such option", ", ".join(changes), "leave it out")
-    if not (folder / _SETTINGS).exists():
+    if not (folder / SETTINGS).exists():
         category = str(name) if folder_of(name).parent == WEIGHTS else "laptop"
         raise DatasetError(
             f"there is no estimator of the method {kind.name}", name,
@@ -204,14 +147,14 @@ def _load_stored(
         )  # fmt: skip
     settings = read_settings(folder)
     _check_method(settings, kind.name, folder)
-    base, (tensors, _) = read_shape_base(folder / _BASE), read_tensors(folder / _TENSORS, "the file of weights", _AGAIN)
+    base, (tensors, _) = read_shape_base(folder / BASE), read_tensors(folder / TENSORS, "the file of weights", _AGAIN)
     try:
         with torch.device("meta"):  # a forged size takes no memory before it is that of the weights
             networks = kind.of_settings(settings, base).networks()
         _check_fit(networks, tensors, folder)
         method = kind.of_settings(settings, base)
     except ValueError as error:
-        raise DatasetError(f"{_SETTINGS} is damaged: {error}", folder, _AGAIN) from error
+        raise DatasetError(f"{SETTINGS} is damaged: {error}", folder, _AGAIN) from error
     for key, network in method.networks().items():
         network.load_state_dict(_under(tensors, f"{key}."))
     return method.to(device)
@@ -314,7 +257,7 @@ def _check_fit(networks: Mapping[str, nn.Module], tensors: Mapping[str, Tensor],
     wanted = {f"{key}.{name}": t.shape for key, net in networks.items() for name, t in net.state_dict().items()}
     problem = None
     if wanted.keys() != tensors.keys():
-        problem = f"{printable(min(wanted.keys() ^ tensors.keys()))} is in only one of {_SETTINGS} and {_TENSORS}"
+        problem = f"{printable(min(wanted.keys() ^ tensors.keys()))} is in only one of {SETTINGS} and {TENSORS}"
     else:
         for name, tensor in tensors.items():
             if tensor.shape != wanted[name] or not tensor.dtype.is_floating_point:
@@ -328,7 +271,7 @@ def _check_fit(networks: Mapping[str, nn.Module], tensors: Mapping[str, Tensor],
 def folder_of(name: str | Path, method: str = "full") -> Path:
     """Folder of an estimator. One that comes with the package is not hidden by a folder of that name without any."""
     own, shipped = Path(name), WEIGHTS / ("" if method == "full" else method) / _FORMER_ESTIMATORS.get(str(name), name)
-    return shipped if shipped.is_dir() and not (own / _SETTINGS).is_file() else own
+    return shipped if shipped.is_dir() and not (own / SETTINGS).is_file() else own
 
 
 _FORMER_ESTIMATORS = {"any": "generic"}
@@ -343,17 +286,17 @@ def read_settings(folder: Path) -> dict[str, Any]:
     DatasetError
         When there is none, or it was written by another version.
     """
-    if not (folder / _SETTINGS).exists():
-        shipped = ", ".join(sorted(path.parent.name for path in WEIGHTS.glob(f"*/{_SETTINGS}"))) or "none"
+    if not (folder / SETTINGS).exists():
+        shipped = ", ".join(sorted(path.parent.name for path in WEIGHTS.glob(f"*/{SETTINGS}"))) or "none"
         raise DatasetError(
             "there is no estimator", folder, f"train one, or use one that comes with the package: {shipped}"
         )
     # An option, or a figure of its training, may be infinite.
-    settings = read_json(folder / _SETTINGS, _SETTINGS, DatasetError, _MAX_SETTINGS_BYTES, finite=False)
+    settings = read_json(folder / SETTINGS, SETTINGS, DatasetError, _MAX_SETTINGS_BYTES, finite=False)
     if not isinstance(settings, dict) or not isinstance(settings.get("about"), dict):
-        raise DatasetError(f"{_SETTINGS} is damaged: it says nothing about an estimator", folder, _AGAIN)
-    if settings.get("format") != _FORMAT:
-        raise DatasetError(f"format {settings.get('format')!r:.20} is not {_FORMAT}", folder, _AGAIN)
+        raise DatasetError(f"{SETTINGS} is damaged: it says nothing about an estimator", folder, _AGAIN)
+    if settings.get("format") != FORMAT:
+        raise DatasetError(f"format {settings.get('format')!r:.20} is not {FORMAT}", folder, _AGAIN)
     own = settings.get("options")
     for values in (settings, own if isinstance(own, dict) else {}):  # methods have them among their options
         for name in ("calibration", "part_calibration"):
@@ -375,7 +318,7 @@ def weights_sha256(folder: Path) -> str:
     DatasetError
         When there are none.
     """
-    return hashlib.sha256(read_bounded(folder / _TENSORS, MAX_BYTES, "weights", DatasetError)).hexdigest()
+    return hashlib.sha256(read_bounded(folder / TENSORS, MAX_BYTES, "weights", DatasetError)).hexdigest()
 
 
 def _under(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:

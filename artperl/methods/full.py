@@ -5,13 +5,15 @@ In the order of the paper: perception and retrieval (4.2), the fit on Theta (4.1
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
+from torch import nn
 
 from artperl.boxes.evidence import BoxContext, Evidence
 from artperl.boxes.network import Boxes
@@ -19,6 +21,7 @@ from artperl.boxes.placement import place_boxes
 from artperl.core.clock import Clock
 from artperl.core.clouds import Clouds
 from artperl.core.confidence import Calibration, PartCalibration
+from artperl.core.device import find_device
 from artperl.core.estimate import Estimate, estimate_of_fit, widen
 from artperl.core.threads import steady_torch
 from artperl.fitting.hypotheses import Context, Fit
@@ -27,6 +30,7 @@ from artperl.fitting.normal_alignment import align_normals
 from artperl.fitting.options import EstimatorOptions
 from artperl.fitting.part_symptoms import part_symptoms
 from artperl.fitting.search import find_fit
+from artperl.methods.estimator_writing import changed_values, save_estimator
 from artperl.methods.many import estimate_many
 from artperl.methods.tracking import track
 from artperl.perception.cloud_checks import cloud_warnings, with_size
@@ -93,6 +97,46 @@ class Estimator:
     def categories(self) -> tuple[str, ...]:
         """Categories of the references."""
         return tuple(dict.fromkeys(self.base.categories))
+
+    @property
+    def device(self) -> torch.device:
+        """Where it works."""
+        return self.perception.device
+
+    def to(self, device: torch.device | str) -> Estimator:
+        """Move it to a device, such as "cuda", and return it, as torch's modules do.
+
+        Raises
+        ------
+        ConfigError
+            When there is no such device.
+        """
+        self.perception.to(find_device(device))
+        self.__post_init__()
+        return self
+
+    def save(self, folder: str | Path, about: Mapping[str, Any] | None = None) -> None:
+        """Write it into a folder, which ``load_estimator`` takes: see :mod:`artperl.methods.estimator_writing`."""
+        save_estimator(self, Path(folder), about or {})
+
+    def __repr__(self) -> str:
+        return f"<Estimator of {', '.join(self.categories)}: {len(self.base.categories)} references, on {self.device}>"
+
+    def networks(self) -> dict[str, nn.Module]:
+        """Its networks by name."""
+        networks = {"perception": self.perception, "boxes": self.boxes, "first_look": self.first_look}
+        return {name: network for name, network in networks.items() if network is not None}
+
+    def settings(self) -> dict[str, Any]:
+        """Sizes of its networks and options, in JSON's terms."""
+        sizes = {"perception": ("num_rows", "width", "votes"), "boxes": ("num_rows", "width")}
+        sizes["first_look"], own = sizes["perception"], self.networks()
+        return {
+            **{net: {key: getattr(own[net], key) for key in keys} for net, keys in sizes.items() if net in own},
+            "options": changed_values(asdict(self.options), asdict(EstimatorOptions())),
+            "calibration": asdict(self.calibration),
+            "part_calibration": asdict(self.part_calibration),
+        }
 
     def __call__(self, points: ArrayLike) -> Estimate:
         """Estimate the pose of every part of the object that a cloud shows.

@@ -52,9 +52,10 @@ class Untrained(Method, Protocol):
         ...
 
 
-class Stored(Method, Protocol):
-    """A method that can be written down: networks are what is learnt, settings what is chosen."""
+class Storable(Protocol):
+    """What can be written down: networks are what is learnt, settings what is chosen."""
 
+    name: ClassVar[str]
     base: ShapeBase
     """References, with the embeddings that they are found by."""
 
@@ -65,6 +66,10 @@ class Stored(Method, Protocol):
     def settings(self) -> dict[str, Any]:
         """Sizes of its networks and options, in JSON's terms."""
         ...
+
+
+class Stored(Method, Storable, Protocol):
+    """A method that is trained, written down and read again."""
 
     @classmethod
     def of_settings(cls, settings: dict[str, Any], base: ShapeBase) -> Self:

@@ -65,7 +65,9 @@ class SceneEstimate:
 
 
 class SceneEstimator:
-    """Estimates the parts of every detected object. Estimators are loaded when their category is first seen.
+    """Estimates all objects of an image: ``load_scene_estimator()(rgb, depth, K)``.
+
+    Estimators are loaded when their category is first seen.
 
     Parameters
     ----------
@@ -165,6 +167,10 @@ class SceneEstimator:
             # The other methods have no options.
             self._loaded[category] = load_estimator(name, method=method, **(self.changes if method == "full" else {}))
         return self._loaded[category]
+
+
+load_scene_estimator = SceneEstimator
+"""The public name."""
 
 
 def check_images(rgb: ArrayLike | None, depth: NDArray[np.float64]) -> None:

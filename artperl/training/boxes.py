@@ -14,7 +14,7 @@ from artperl.data.sources import Source
 from artperl.evaluation.samples import NUM_POINTS, VALIDATION_SEEDS
 from artperl.evaluation.scoring import evaluate, mean_iou
 from artperl.evaluation.tables import summary
-from artperl.methods.estimator_files import save_estimator
+from artperl.methods.estimator_writing import save_estimator
 from artperl.methods.full import Estimator
 from artperl.training.box_records import learn, record
 from artperl.training.context import Context

@@ -74,7 +74,7 @@ class Context:
         """
         try:
             method: str = self.options.method
-            found = load_estimator(self.folder.best, device, method=method)
+            found = load_estimator(self.folder.best, method, device)
             return cast("Estimator | Stored", found)
         except DatasetError as error:
             raise DatasetError(f"the best estimator is lost ({error.what})", error.where, self.folder.fix) from error

@@ -81,7 +81,7 @@ class Training:
         networks = programme.networks(options, objects.num_rows)
         start = options.start_from
         method: str = options.method
-        parent = None if start is None else cast("Estimator | Stored", load_estimator(start, own, method=method))
+        parent = None if start is None else cast("Estimator | Stored", load_estimator(start, method, own))
         if parent is not None:
             _start_from(parent, networks, str(start))
         optimizers: dict[str, torch.optim.Optimizer] = {

@@ -9,14 +9,14 @@ from typing import Any
 def lazy_names(
     package: str, homes: Mapping[str, str], packages: tuple[str, ...] = ()
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """What a package defines as ``__getattr__`` and ``__dir__`` (PEP 562).
+    """What a package defines as ``__getattr__`` and ``__dir__`` (PEP 562). Its ``__all__`` stands before.
 
     Parameters
     ----------
     package : str
         Its ``__name__``.
     homes : mapping
-        Public name -> module of the package that defines it.
+        Public name -> module of the package that defines it. Where that needs an extra, the error says which.
     packages : tuple of str
         Modules of the package that are imported when they are asked for.
     """
@@ -24,7 +24,10 @@ def lazy_names(
 
     def get(name: str) -> Any:
         if name in homes:
-            value = getattr(import_module(f"{package}.{homes[name]}"), name)
+            from artsim.common.extras import require_extra  # here, since every "import artsim" imports this module
+
+            with require_extra(package):
+                value = getattr(import_module(f"{package}.{homes[name]}"), name)
             setattr(module, name, value)  # from now on it is found at once
             return value
         if name in packages:
@@ -32,6 +35,7 @@ def lazy_names(
         raise AttributeError(f"module {package!r} has no attribute {name!r}", name=name, obj=module)
 
     def names() -> list[str]:
-        return sorted({*vars(module), *homes, *packages})
+        """Public names alone."""
+        return sorted({*module.__all__, *packages})
 
     return get, names

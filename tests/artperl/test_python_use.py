@@ -77,4 +77,4 @@ def test_a_device_that_is_not_there_is_one_clear_error(device: str, method: str)
     if device == "cuda" and torch.cuda.is_available():
         pytest.skip("it is there")
     with pytest.raises(ConfigError, match=r"torch finds no GPU here|torch cannot work on"):
-        load_estimator("laptop", device, method=method)
+        load_estimator("laptop", method, device)

@@ -163,7 +163,7 @@ def _estimator(made: Path) -> None:
     import torch
 
     from artperl.boxes.network import Boxes
-    from artperl.methods.estimator_files import save_estimator
+    from artperl.methods.estimator_writing import save_estimator
     from artperl.methods.full import Estimator
     from artperl.perception.network import Perception
     from artperl.retrieval.box_embedding import by_boxes

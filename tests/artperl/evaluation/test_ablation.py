@@ -20,7 +20,7 @@ from artperl.evaluation.ablation import (
     verdict_lines,
 )
 from artperl.evaluation.samples import frozen_samples
-from artperl.methods.estimator_files import save_estimator
+from artperl.methods.estimator_writing import save_estimator
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception
 from artsim.errors import ConfigError

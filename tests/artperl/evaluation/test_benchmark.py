@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from artperl.evaluation.benchmark import category_folder, run_benchmark
-from artperl.methods.estimator_files import save_estimator
+from artperl.methods.estimator_writing import save_estimator
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception
 from tests.artperl.worlds import small_base

@@ -15,7 +15,8 @@ from artperl.data.truth import to_batch, training_rows
 from artperl.evaluation.scoring import Scored, score
 from artperl.inputs.detections import Detection
 from artperl.methods.ancsh import ANCSH, ancsh_networks
-from artperl.methods.estimator_files import load_estimator, save_estimator
+from artperl.methods.estimator_files import load_estimator
+from artperl.methods.estimator_writing import save_estimator
 from artperl.methods.protocol import NetworkSizes
 from artperl.perception.ancsh_networks import CoordinateNetwork, Coordinates, JointNetwork, JointPoints
 from artperl.retrieval.shape_base import ShapeBase

@@ -18,7 +18,8 @@ from artperl.core.shapes import Observed
 from artperl.evaluation.metrics import rotation_error
 from artperl.fitting.refine_options import RefineOptions
 from artperl.methods.artperl import ArtPERL, ArtPERLOptions
-from artperl.methods.estimator_files import load_estimator, save_estimator
+from artperl.methods.estimator_files import load_estimator
+from artperl.methods.estimator_writing import save_estimator
 from artperl.methods.retrieved import Sizes
 from artperl.perception.segmentation import Segmentation
 from artperl.retrieval.shape_base import ShapeBase

@@ -12,7 +12,8 @@ import artsim
 from artperl.agent.start import MeanView
 from artperl.core.confidence import Calibration, PartCalibration
 from artperl.methods.artperl import ArtPERL
-from artperl.methods.estimator_files import load_estimator, save_estimator
+from artperl.methods.estimator_files import load_estimator
+from artperl.methods.estimator_writing import save_estimator
 from artperl.methods.retrieved import Sizes
 from artperl.retrieval.shape_base import ShapeBase
 from artperl.retrieval.siamese import by_siamese

@@ -11,7 +11,8 @@ import torch
 
 from artperl.core.confidence import Calibration
 from artperl.fitting.options import EstimatorOptions
-from artperl.methods.estimator_files import load_estimator, save_estimator
+from artperl.methods.estimator_files import load_estimator
+from artperl.methods.estimator_writing import save_estimator
 from artperl.methods.full import Estimator
 from artperl.perception.network import Perception
 from artperl.retrieval.shape_base import ShapeBase
@@ -28,7 +29,10 @@ def test_an_estimator_comes_back_from_its_folder(base: ShapeBase, sample: Sample
     assert (back.options, back.calibration) == (options, made.calibration)
     for name, tensor in made.perception.state_dict().items():  # half precision
         torch.testing.assert_close(back.perception.state_dict()[name], tensor, rtol=5e-4, atol=1e-7)
-    save_estimator(back, tmp_path / "again", {})
+    assert repr(back) == f"<Estimator of laptop: {len(base.categories)} references, on cpu>"
+    assert back.to("cpu") is back
+    assert back.device == torch.device("cpu")
+    back.save(tmp_path / "again")
     again = load_estimator(tmp_path / "again")
     np.testing.assert_array_equal(again(sample.points).T_camera_part, back(sample.points).T_camera_part)
 

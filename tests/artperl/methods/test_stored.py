@@ -20,7 +20,8 @@ from artperl.evaluation.scoring import evaluate
 from artperl.methods import METHODS, STORED_METHODS, method_of
 from artperl.methods.ancsh import ANCSH, ancsh_networks
 from artperl.methods.artperl import ArtPERL
-from artperl.methods.estimator_files import load_estimator, save_estimator
+from artperl.methods.estimator_files import load_estimator
+from artperl.methods.estimator_writing import save_estimator
 from artperl.methods.full import Estimator
 from artperl.methods.omad import OMAD, OMADOptions, omad_networks
 from artperl.methods.protocol import NetworkSizes, Stored
