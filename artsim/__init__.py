@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 from artsim import errors
 from artsim.common.lazy import lazy_names
-from artsim.common.showing import PAGE_MODULES
+from artsim.common.showing import EXPORT_MODULES, PAGE_MODULES
 from artsim.errors import ArtsimError
 
 if TYPE_CHECKING:
@@ -113,3 +113,4 @@ _HOMES = {
 _PACKAGES = ("checks", "drawing", "envs", "export", "formats", "physics", "scenes", "stream")
 __getattr__, __dir__ = lazy_names(__name__, _HOMES, _PACKAGES)
 PAGE_MODULES.append("artsim.drawing.page")
+EXPORT_MODULES.append("artsim.export")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
@@ -12,14 +12,12 @@ from itertools import tee
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from artperl.commands.estimate_many import with_warnings
 from artperl.commands.estimate_options import STDOUT, EstimateOptions
-from artperl.commands.estimate_record import arrays_of, record_of
 from artperl.commands.estimate_scene import estimate_scene, is_image_pair
 from artperl.commands.estimators import estimator_folder
 from artperl.commands.resumed_lines import line_name
-from artsim.common.outputs import check_output, output_file, write_output
+from artsim.common.outputs import check_output, write_output
 from artsim.common.progress import track
 from artsim.errors import ConfigError
 from artsim.export.folders import new_folder
@@ -116,8 +114,7 @@ class Estimate(EstimateOptions):
         cloud = read_cloud(file, self.input_options())
         for text in cloud.notes:
             print(f"note: {text}", file=sys.stderr)
-        result = estimator(cloud.points)
-        record = record_of(result, cloud)
+        result = with_warnings(estimator(cloud.points), cloud)
         folders = {"urdf": self.urdf, "mjcf": self.mjcf, "usd": self.usd}
         for folder in dict.fromkeys(folder for folder in folders.values() if folder is not None):
             formats = [kind for kind, given in folders.items() if given == folder]
@@ -125,17 +122,14 @@ class Estimate(EstimateOptions):
                 result.export(part, formats, result.reference.partition(":")[0] or self.category, file.stem)
         if self.view is not None:
             write_output(self.view, page(result, cloud.points, f"{file.name}: {self.category}").encode())
+        for text in result.warnings:
+            print(f"warning: {text}", file=sys.stderr)
         if self.out == STDOUT:
-            _warn(record["warnings"])
-            print(json.dumps(record, indent=1))
+            print(json.dumps(result.to_dict() | {"notes": cloud.notes}, indent=1))
             return
-        _warn(cloud.warnings)
-        print(result)
-        if self.out is not None and self.out.suffix == ".npz":
-            with output_file(self.out) as out:
-                np.savez(out, allow_pickle=False, **arrays_of(result, cloud))
-        elif self.out is not None:
-            write_output(self.out, (json.dumps(record, indent=1) + "\n").encode())
+        print(replace(result, warnings=()))
+        if self.out is not None:
+            result.save(self.out, cloud.notes)
 
     def _estimate_all(self, load: Callable[[], Method]) -> None:
         """A line of JSON for each cloud, written as soon as it is known, so that Ctrl-C loses nothing."""
@@ -163,8 +157,3 @@ class Estimate(EstimateOptions):
             kind = "clouds" if clouds.shards else "files"
             print(f"error: {failed} of {total} {kind} failed; each line with an 'error' says why", file=sys.stderr)
             sys.exit(1)
-
-
-def _warn(texts: Iterable[str]) -> None:
-    for text in texts:
-        print(f"warning: {text}", file=sys.stderr)

@@ -5,21 +5,21 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from artperl.commands.estimate_record import record_of
 from artsim.datasets.dataset import open_dataset
 from artsim.datasets.description import DESCRIPTION
 from artsim.datasets.shards import ShardReader
 from artsim.errors import ArtsimError, ConfigError, DatasetError
 
 if TYPE_CHECKING:
-    from artperl.inputs import InputOptions
+    from artperl.core.estimate import Estimate as Result
+    from artperl.inputs import Cloud, InputOptions
     from artperl.methods.protocol import Method
 
 _NAMED = 8
@@ -121,6 +121,11 @@ def _reader_since(shard: Path, changed: int) -> ShardReader:
     return ShardReader(shard, "generate or download it again; artsim verify names what else is damaged")
 
 
+def with_warnings(result: Result, cloud: Cloud) -> Result:
+    """An estimate with what looks wrong with its file, too."""
+    return replace(result, warnings=(*cloud.warnings, *result.warnings))
+
+
 @dataclass(frozen=True)
 class Estimating:
     """Makes, in each process, the function that gives the record of an entry."""
@@ -149,7 +154,7 @@ class _Recorder:
                 cloud = read_cloud(entry.file, self.options)
             else:
                 cloud = Cloud(_reader(entry.file).read(entry.sample or "").points.astype(np.float64))
-            return record_of(self.method(cloud.points), cloud)
+            return with_warnings(self.method(cloud.points), cloud).to_dict() | {"notes": list(cloud.notes)}
         except (ArtsimError, OSError) as error:
             return {"error": str(error)}
         except UNEXPECTED as error:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from PIL import Image
 
 from artperl.commands.estimate_options import STDOUT, EstimateOptions
-from artperl.commands.estimate_record import plain_record
 from artperl.commands.estimators import named_estimators
 from artperl.detection import SHIPPED
 from artsim.common.outputs import write_output
@@ -135,7 +134,7 @@ def scene_record(result: SceneEstimate, detections: Detections) -> dict[str, Any
         if obj.estimate is None:
             objects.append({**record, "error": obj.problem})
         else:
-            objects.append({**record, "score": obj.score, **plain_record(obj.estimate)})
+            objects.append({**record, "score": obj.score, **obj.estimate.to_dict()})
     return {
         "objects": objects, "skipped": list(detections.skipped), "notes": list(detections.notes),
         "milliseconds": result.milliseconds,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,7 +19,9 @@ from artperl.core.neighbours import tree_of
 from artperl.core.pose import Posed, Theta, joint_axes, joint_states, pose_parts, reach
 from artperl.core.shapes import Observed, Shapes
 from artperl.core.trees import KINDS
+from artsim.common.outputs import output_file, write_output
 from artsim.common.showing import Showable
+from artsim.errors import ConfigError
 
 Array = NDArray[np.float64]
 
@@ -153,13 +156,53 @@ class Estimate(Showable):
         estimated = {"T_camera_object": T.tolist(), "q": q.tolist(), "confidence": self.confidence}
         return export(obj, folder, formats, notes={"estimate": estimated})
 
+    def to_dict(self) -> dict[str, Any]:
+        """The estimate in JSON's terms, but for the part of every point: lists, and None for what is infinite."""
+        record = {name: _plain(value) for name, value in vars(self).items() if name not in ("part", "part_symptoms")}
+        return {**record, "state_unit": list(self.state_unit)}
+
+    def save(self, path: str | Path, notes: Sequence[str] = ()) -> Path:
+        """Write the estimate as ``.json``, as :meth:`to_dict` has it, or as ``.npz`` with the part of every point.
+
+        Parameters
+        ----------
+        path : path
+        notes : sequence of str
+            Remarks that are written with it.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        ConfigError
+            When the file is of another kind, or cannot be written.
+        """
+        path = Path(path)
+        if path.suffix == ".json":
+            write_output(path, (json.dumps({**self.to_dict(), "notes": list(notes)}, indent=1) + "\n").encode())
+        elif path.suffix == ".npz":
+            values = {**vars(self), "state_unit": self.state_unit, "notes": tuple(notes)}
+            texts = ("joint_type", "part_names", "state_unit", "warnings", "notes", "reference")
+            with output_file(path) as out:
+                np.savez(
+                    out, allow_pickle=False,
+                    **{name: np.asarray(value, dtype=str if name in texts else None) for name, value in values.items()
+                       if name not in ("milliseconds", "part_symptoms")},
+                )  # fmt: skip
+        else:
+            raise ConfigError("it is no .json or .npz file", path, "name one")
+        return path
+
     def __str__(self) -> str:
         rows = [HEAD, *cells(self)[:_MOST_PARTS]]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
         more = len(self.joint_type) - _MOST_PARTS
         lines += [f"... and {more} parts more"] if more > 0 else []
-        return "\n".join([summary(self), *lines, *(f"warning: {text}" for text in self.warnings)])
+        return "\n".join([*(f"warning: {text}" for text in self.warnings), summary(self), *lines])
 
     def __repr__(self) -> str:
         states = [f"{name} {state}".strip() for name, _, state, *_ in cells(self)[:8]]
@@ -167,6 +210,14 @@ class Estimate(Showable):
         warnings = f", {len(self.warnings)} warnings" if self.warnings else ""
         sure = f"confidence {100 * self.confidence:.0f} %"
         return f"<Estimate of {self.reference}: {', '.join(states)}; {sure}{warnings}>"
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def summary(estimate: Estimate) -> str:

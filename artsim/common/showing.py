@@ -1,6 +1,10 @@
-"""Things that can be looked at: in a browser by :meth:`Showable.show`, in a notebook by themselves."""
+"""Things that can be looked at, by :meth:`Showable.show` or in a notebook by themselves, and written for simulators.
+
+What does it stands in rooms above, whose modules register it.
+"""
 
 import html
+from collections.abc import Sequence
 from functools import singledispatch
 from importlib import import_module
 from pathlib import Path
@@ -9,6 +13,8 @@ from typing import Any
 PAGE_MODULES: list[str] = []
 """Modules that register pages with ``page_of``. A package names its own when it is imported; each is imported when the
 first page is asked for."""
+EXPORT_MODULES: list[str] = []
+"""Modules that register with ``export_of``, likewise."""
 _HEIGHT = 480
 """Pixels of a page in a notebook."""
 
@@ -29,6 +35,23 @@ def page_of(thing: Any, **more: Any) -> str:
         When the type has no page.
     """
     raise TypeError(f"{type(thing).__name__} has no page")
+
+
+@singledispatch
+def export_of(thing: Any, folder: str | Path, formats: Sequence[str]) -> dict[str, Any]:
+    """Write a thing for simulators into a folder. Modules of ``EXPORT_MODULES`` register a function for each type.
+
+    Raises
+    ------
+    TypeError
+        When the type is not written.
+    """
+    for module in EXPORT_MODULES:
+        import_module(module)
+    written = export_of.dispatch(type(thing))
+    if written is export_of.dispatch(object):
+        raise TypeError(f"{type(thing).__name__} is not written for simulators")
+    return written(thing, folder, formats)
 
 
 class Showable:

@@ -15,6 +15,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from artsim.common.showing import export_of
 from artsim.errors import ConfigError
 from artsim.export.loaded import prepare
 from artsim.export.looks import MATERIALS_FILE, NO_FINISH, Finish, draw_finish, looks_text, materials_text
@@ -156,6 +157,11 @@ def _write_pictures(folder: Path, finish: Finish) -> None:
     folder.mkdir(exist_ok=True)
     for name, content in finish.pictures.items():
         (folder / name).write_bytes(content)
+
+
+@export_of.register
+def _export_object(obj: ArticulatedObject, folder: str | Path, formats: Sequence[str]) -> dict[str, Any]:
+    return export(prepare(obj), folder, formats)
 
 
 __all__ = ["FORMATS", "export", "prepare"]

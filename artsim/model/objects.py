@@ -6,14 +6,15 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from artsim.common.names import printable
 from artsim.common.products import norm
-from artsim.common.showing import Showable
+from artsim.common.showing import Showable, export_of
 from artsim.common.tables import brief, centimetres, cut, joint_value, label_of, plural, table, three_digits
 from artsim.errors import AssetError, ConfigError, KinematicsError
 from artsim.model.details import NO_DETAIL, Detail, DetailFrame, detail_of_faces, numbered, on_faces
@@ -341,6 +342,28 @@ class ArticulatedObject(Showable):
         q = self.tree.complete_state(q)
         native = np.array([q[k] / (self.scale if t == "prismatic" else 1.0) for k, t in enumerate(self.tree.types)])
         return {name: multiplier * float(native[k]) for name, (k, multiplier) in self.source_joints.items()}
+
+    def export(self, folder: str | Path, formats: Sequence[str] = ("urdf",)) -> dict[str, Any]:
+        """Write the object for simulators; see :func:`artsim.export.prepare` and :func:`artsim.export.export`.
+
+        Parameters
+        ----------
+        folder : path
+            Made if missing.
+        formats : sequence of str
+            Of "urdf", "mjcf", "usd", "usdz" and "simready".
+
+        Returns
+        -------
+        dict
+            Content of ``meta.json``.
+
+        Raises
+        ------
+        ConfigError
+            When a format is unknown, or what cuts hollow parts into convex pieces is not installed.
+        """
+        return export_of(self, folder, formats)
 
     def part_mesh(self, k: int) -> trimesh.Trimesh:
         """Part k as a trimesh in the rest frame, at rest, metres."""

@@ -33,6 +33,21 @@ def true_estimate(obj: ArticulatedObject, seed: int = 0) -> Estimate:
     )  # fmt: skip
 
 
+def test_a_saved_estimate_says_what_the_estimate_says(tmp_path: Path) -> None:
+    estimate = true_estimate(artsim.make("fan", 2))
+    assert np.isinf(estimate.joint_limits).any()  # JSON has no word for it
+    told = json.loads(estimate.save(tmp_path / "pose.json", ["seen at dusk"]).read_text(), parse_constant=pytest.fail)
+    assert told == {**json.loads(json.dumps(estimate.to_dict())), "notes": ["seen at dusk"]}
+    np.testing.assert_array_equal(told["T_camera_part"], estimate.T_camera_part)
+    limits = np.where(np.isinf(estimate.joint_limits), None, estimate.joint_limits)
+    assert told["joint_limits"] == limits.tolist()
+    arrays = np.load(estimate.save(tmp_path / "pose.npz"))
+    np.testing.assert_array_equal(arrays["joint_limits"], estimate.joint_limits)
+    assert arrays["part_names"].tolist() == list(estimate.part_names)
+    with pytest.raises(ConfigError, match=r"no \.json or \.npz"):
+        estimate.save(tmp_path / "pose.txt")
+
+
 @pytest.mark.parametrize("category", ["storage_furniture", "laptop", "refrigerator", "fan", "eyeglasses"])
 def test_parts_stand_where_they_were_estimated_in_mujoco(category: str, tmp_path: Path) -> None:
     import mujoco

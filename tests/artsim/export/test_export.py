@@ -59,6 +59,13 @@ def test_every_family_is_written_strictly_and_reads_back_as_it_was(category: str
         assert strict_kinematics(loaded) == []
 
 
+def test_an_object_exports_itself(tmp_path: Path) -> None:
+    obj = make("globe", 1)
+    assert obj.export(tmp_path / "one") == export(obj, tmp_path / "other")
+    assert (tmp_path / "one" / "mobility.urdf").read_bytes() == (tmp_path / "other" / "mobility.urdf").read_bytes()
+    assert_same(load(tmp_path / "one"), obj)
+
+
 def test_all_joint_types_and_the_order_of_parts_survive(tmp_path: Path) -> None:
     obj = valve()
     export(obj, tmp_path / "3")
