@@ -22,7 +22,7 @@ from artsim.datasets.splits import SPLITS
 from artsim.datasets.summary import summary
 from artsim.errors import ConfigError, DatasetError
 from artsim.model.objects import ArticulatedObject
-from artsim.observing.padding import PaddedDataset, PaddedStream
+from artsim.observing.padding import PaddedDataset, PaddedStream, refuse_collation
 from artsim.observing.sample import Sample
 from artsim.runs.storage import FolderStorage, Place, storage_of
 
@@ -88,6 +88,11 @@ class Dataset:
         shard, index = self._place(int(i) % len(self))
         return self._reader(shard).read(sample_key(index))
 
+    def __getitems__(self, indices: list[int]) -> list[Sample]:
+        """A batch, as a torch ``DataLoader`` asks for it."""
+        refuse_collation()
+        return [self[i] for i in indices]
+
     def _place(self, i: int) -> tuple[ShardRecord, int]:
         """Shard and number in the whole dataset of sample ``i``."""
         s = bisect.bisect_right(self._ends, i)
@@ -144,7 +149,7 @@ class Dataset:
         """The object that a sample shows, at the sample's scale."""
         return self.objects[self.planned(sample.index).file].scaled(sample.scale)
 
-    def padded(self, max_parts: int | None = None, float32: bool = False) -> PaddedDataset:
+    def padded(self, max_parts: int | None = None, float32: bool = True) -> PaddedDataset:
         """View as dictionaries of arrays of one shape, which default collation stacks.
 
         Parameters
@@ -152,7 +157,7 @@ class Dataset:
         max_parts : int, optional
             Rows of per-part arrays; by default the most parts of any object of the dataset.
         float32 : bool
-            Poses, boxes and joints in single precision, too.
+            Poses, boxes, joints and cameras in single precision.
         """
         return PaddedDataset(self, max_parts or self.plan.max_parts, float32)
 
@@ -195,7 +200,7 @@ class SampleStream(DrawnStream):
         super().__init__(plan.sample, seed, 1, start, step)
         self.plan, self.split, self.objects = plan, split, ObjectCache(place)
 
-    def padded(self, max_parts: int | None = None, float32: bool = False) -> PaddedStream:
+    def padded(self, max_parts: int | None = None, float32: bool = True) -> PaddedStream:
         """The stream as dictionaries of arrays of one shape; see :meth:`Dataset.padded`."""
         return PaddedStream(self, max_parts or self.plan.max_parts, float32)
 
@@ -236,7 +241,7 @@ class EpochStream(Shared):
         """Which epoch the next iteration goes through: another one has another order."""
         self.epoch = epoch
 
-    def padded(self, max_parts: int | None = None, float32: bool = False) -> PaddedStream:
+    def padded(self, max_parts: int | None = None, float32: bool = True) -> PaddedStream:
         """The stream as dictionaries of arrays of one shape; see :meth:`artsim.datasets.dataset.Dataset.padded`."""
         return PaddedStream(self, max_parts or self.dataset.plan.max_parts, float32)
 
@@ -249,6 +254,7 @@ class EpochStream(Shared):
         return self.dataset[i]
 
     def __iter__(self) -> Iterator[Sample]:
+        refuse_collation()
         share, shares = self._share()
         rng = np.random.default_rng([self.seed, self.epoch, share, shares])
         pieces = list(self._pieces(share, shares))

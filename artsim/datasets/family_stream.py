@@ -55,7 +55,7 @@ class FamilyStream(DrawnStream):
         self.categories = categories
         super().__init__(options or SampleOptions(), seed, views_per_object, start, step)
 
-    def padded(self, max_parts: int, float32: bool = False) -> PaddedStream:
+    def padded(self, max_parts: int, float32: bool = True) -> PaddedStream:
         """The stream as dictionaries of arrays of one shape, which default collation stacks.
 
         Parameters
@@ -63,7 +63,7 @@ class FamilyStream(DrawnStream):
         max_parts : int
             Rows of per-part arrays. An object with more parts is an error.
         float32 : bool
-            Poses, boxes and joints in single precision, too.
+            Poses, boxes, joints and cameras in single precision.
         """
         return PaddedStream(self, max_parts, float32)
 

@@ -13,6 +13,7 @@ from artsim.errors import ConfigError, RenderError
 from artsim.model.draws import Scale, StateOptions, ViewOptions, sample_scale, sample_state, sample_view
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.capture import observe
+from artsim.observing.padding import refuse_collation
 from artsim.observing.sample import Sample
 from artsim.renderers import Renderer, RendererName, make_renderer
 
@@ -153,6 +154,7 @@ class DrawnStream(Shared):
         return draw_sample(self.object(i // self.views_per_object), self.options, self.seed, i, self._renderer)
 
     def __iter__(self) -> Iterator[Sample]:
+        refuse_collation()
         share, shares = self._share()
         for n in itertools.count(self.start + share * self.step, shares * self.step):
             for view in range(self.views_per_object):

@@ -235,10 +235,10 @@ class ArticulatedEnv(gymnasium.Env[Observation, Any]):
     def _look(self) -> tuple[Observation, dict[str, Any]]:
         simulation, options = self.simulation, self.options
         obj, self.sample = simulation.obj, self.episode.look(self.np_random)
-        record = pad_sample(self.sample, options.max_joints + 1)
+        record = pad_sample(self.sample, options.max_joints + 1, float32=False)
         # Copies: what is handed out is the receiver's, whatever the object and the camera share.
         observation = {name: record[name].copy() for name in ("points", *options.images)}
-        info: dict[str, Any] = {name: array.copy() for name, array in record.items()}
+        info = {name: array.copy() if isinstance(array, np.ndarray) else array for name, array in record.items()}
         velocity, limit = np.zeros(options.max_joints + 1), np.zeros(options.max_joints)
         velocity[: len(obj)] = simulation.velocity
         limit[: len(self._action_limit())] = self._action_limit()
@@ -248,8 +248,6 @@ class ArticulatedEnv(gymnasium.Env[Observation, Any]):
             "openness": self._openness,
             "action_valid": limit > 0,
             "action_limit": limit,
-            "category": obj.category,
-            "object_id": obj.object_id,
             "part_names": " ".join(self.sample.part_names),
         }
         return observation, info

@@ -111,21 +111,26 @@ def farther_ends(obj: ArticulatedObject) -> Array:
     return np.where(high - rest >= rest - low, high, low)
 
 
-def sample_state(obj: ArticulatedObject, options: StateOptions, rng: np.random.Generator) -> Array:
+def sample_state(
+    obj: ArticulatedObject, options: StateOptions | None = None, rng: np.random.Generator | None = None
+) -> Array:
     """Draw joint states.
 
     Parameters
     ----------
     obj : ArticulatedObject
-    options : StateOptions
-    rng : numpy Generator
+    options : StateOptions, optional
+        By default, anywhere within the limits.
+    rng : numpy Generator, optional
+        Seeded with 0 by default: the same state each time.
 
     Returns
     -------
     (K,) float
         Complete state, mimic joints set; radians or metres at the object's scale.
     """
-    return states_at(obj, options, rng.random(len(obj.tree)))
+    rng = rng or np.random.default_rng(0)
+    return states_at(obj, options or StateOptions(), rng.random(len(obj.tree)))
 
 
 def states_at(obj: ArticulatedObject, options: StateOptions, draw: Array) -> Array:
@@ -180,7 +185,12 @@ def sample_scale(obj: ArticulatedObject, scale: Scale, rng: np.random.Generator)
     return obj.with_diagonal(low + float(rng.random()) * (high - low))
 
 
-def sample_view(obj: ArticulatedObject, q: ArrayLike, options: ViewOptions, rng: np.random.Generator) -> Camera:
+def sample_view(
+    obj: ArticulatedObject,
+    q: ArrayLike,
+    options: ViewOptions | None = None,
+    rng: np.random.Generator | None = None,
+) -> Camera:
     """Draw a camera that looks at the posed object from a distance at which it fits the image.
 
     Parameters
@@ -188,9 +198,11 @@ def sample_view(obj: ArticulatedObject, q: ArrayLike, options: ViewOptions, rng:
     obj : ArticulatedObject
         Stands with its rest frame on the world's.
     q : (K,) float
-    options : ViewOptions
-    rng : numpy Generator
+    options : ViewOptions, optional
+    rng : numpy Generator, optional
+        Seeded with 0 by default.
     """
+    options, rng = options or ViewOptions(), rng or np.random.default_rng(0)
     if options.custom is not None:
         return view_sampler(options.custom)(rng, obj, np.asarray(q, dtype=np.float64))
     azimuth, elevation = options.draw_directions(rng)

@@ -10,6 +10,7 @@ from artsim.common.products import matmul
 from artsim.common.sequences import listed
 from artsim.errors import ConfigError, RenderError
 from artsim.model.camera import Camera
+from artsim.model.draws import sample_view
 from artsim.model.frame import BACKGROUND, Frame
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
@@ -22,8 +23,8 @@ from artsim.renderers.raycast import PosedObject, cast, cast_counted, pose, rend
 
 def observe(
     obj: ArticulatedObject,
-    q: ArrayLike,
-    camera: Camera,
+    q: ArrayLike | None = None,
+    camera: Camera | None = None,
     T_world_object: ArrayLike | None = None,
     num_points: int = 2048,
     renderer: str | Renderer = "raycast",
@@ -44,9 +45,10 @@ def observe(
     Parameters
     ----------
     obj : ArticulatedObject
-    q : (K,) float
-        Joint states in radians or metres; the root's entry is ignored.
-    camera : Camera
+    q : (K,) float, optional
+        Joint states in radians or metres; the root's entry is ignored. By default, the object is at rest.
+    camera : Camera, optional
+        Drawn by :func:`artsim.sample_view` by default: it sees the whole object, from the front.
     T_world_object : (4, 4) float, optional
         Pose of the rest frame in the world; identity by default.
     num_points : int
@@ -80,7 +82,12 @@ def observe(
     unknown = set(images) - set(IMAGES)
     if unknown:
         raise ConfigError(f"there is no image {', '.join(sorted(unknown))}", "images", f"use {', '.join(IMAGES)}")
-    rng = rng or np.random.default_rng(0)
+    rng, q = rng or np.random.default_rng(0), obj.tree.rest if q is None else q
+    if camera is None:
+        camera = sample_view(obj, q, rng=rng)
+        if T_world_object is not None:
+            T = matmul(np.asarray(T_world_object, dtype=np.float64), camera.T_world_camera)
+            camera = replace(camera, T_world_camera=T)
     name, sensor = renderer if isinstance(renderer, str) else renderer.name, find_sensor(noise)
     key = int(rng.integers(2**63)) if sensor.steps else 0
     posed = pose(obj, q, camera, T_world_object)

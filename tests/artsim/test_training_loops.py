@@ -32,7 +32,7 @@ def indices(loader: DataLoader[object], batches: int) -> list[int]:
 @pytest.mark.parametrize("context", ["fork", "spawn", "forkserver"])
 @pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
 def test_workers_of_a_loader_share_a_stream_out(context: str) -> None:
-    stream = FamilyStream(["laptop", "drawer"], SMALL, views_per_object=2).padded(max_parts=8, float32=True)
+    stream = FamilyStream(["laptop", "drawer"], SMALL, views_per_object=2).padded(max_parts=8)
     loader = DataLoader(stream, batch_size=4, num_workers=2, multiprocessing_context=context)
     assert sorted(indices(loader, 6)) == list(range(24))
     batch = next(iter(loader))
@@ -68,11 +68,25 @@ def test_datasets_and_their_streams_can_be_written_to(folder: Path) -> None:
     dataset = artsim.open_dataset(folder)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        for source in (dataset.padded(float32=True), dataset.stream().padded(float32=True)):
+        for source in (dataset.padded(), dataset.stream().padded()):
             batch = next(iter(DataLoader(source, batch_size=3)))
             assert batch["T_camera_part"].dtype == torch.float32
-            assert all(array.flags.writeable for array in source[0].values())
-    assert dataset.padded()[0]["T_camera_part"].dtype == np.float64
+            assert batch["part"].dtype == torch.int64
+            assert batch["category"] == ["laptop"] * 3
+            assert batch["part_names"] == [("base",) * 3, ("lid",) * 3]
+            assert all(array.flags.writeable for array in source[0].values() if isinstance(array, np.ndarray))
+    assert dataset.padded(float32=False)[0]["T_camera_part"].dtype == np.float64
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [0, 1])
+def test_a_loader_of_samples_as_they_are_says_what_to_do(folder: Path, workers: int) -> None:
+    dataset = artsim.open_dataset(folder)
+    for source in (dataset, dataset.stream(), dataset.shuffled()):
+        with pytest.raises(ConfigError, match=r"dataset\.padded\(\)"):
+            next(iter(DataLoader(source, batch_size=2, num_workers=workers)))
+        batch = next(iter(DataLoader(source, batch_size=2, num_workers=workers, collate_fn=list)))
+        assert [len(sample.points) for sample in batch] == [32, 32]
 
 
 def _epochs(rank: int, ranks: int, folder: str, results: str) -> None:

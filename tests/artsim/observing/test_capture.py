@@ -82,6 +82,22 @@ def test_a_cloud_carried_back_lands_in_its_rest_frame_boxes() -> None:
         assert ((back > low - 1e-5) & (back < high + 1e-5)).all()
 
 
+def test_by_default_an_object_is_seen_at_rest_whole_and_wherever_it_stands() -> None:
+    obj, T_world_object = artsim.make("drawer", 3), np.eye(4)
+    T_world_object[:3, 3] = 1.0, 2.0, 3.0
+    here, there = observe(obj), observe(obj, T_world_object=T_world_object)
+    np.testing.assert_array_equal(here.joint_state, obj.tree.rest)
+    corners = trimesh.bounds.corners(obj.bounds)
+    pixels = (transform_points(here.T_camera_part[0], corners) @ here.K.T)[:, :2] / (
+        transform_points(here.T_camera_part[0], corners)[:, 2:]
+    )
+    assert (pixels >= 0.0).all()
+    assert (pixels <= [here.width, here.height]).all()
+    np.testing.assert_allclose(there.points, here.points, atol=1e-5)
+    np.testing.assert_allclose(there.T_world_camera[:3, 3] - here.T_world_camera[:3, 3], [1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(sample_state(obj), sample_state(obj, StateOptions(), np.random.default_rng(0)))
+
+
 def test_npcs_have_one_uniform_scale_for_each_part() -> None:
     """Distances in NPCS are distances in space over the diagonal of the part's box, as Umeyama's fit needs."""
     obj = artsim.load(ASSETS / "laptop")
