@@ -16,7 +16,6 @@ import sys
 import tarfile
 import tempfile
 from collections.abc import Iterable, Iterator
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,6 @@ from unittest.mock import patch
 import embreex
 import numpy as np
 from embreex.rtcore import EmbreeDevice
-from embreex.rtcore_scene import EmbreeScene
 
 import artsim
 from artsim.commands.doctor import processor
@@ -217,7 +215,7 @@ def embree(code: str) -> Iterator[None]:
     assert held.value, f"Embree has no code {code}"
     raycast._surfaces.clear()
     try:
-        with patch("embreex.rtcore_scene.EmbreeScene", partial(EmbreeScene, device)):
+        with patch("artsim.renderers.ray_scenes.embree_device", lambda process: device):
             yield
     finally:
         raycast._surfaces.clear()

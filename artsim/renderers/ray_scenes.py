@@ -1,5 +1,7 @@
 """Triangles to cast rays at: Embree's, or Warp's where Embree has no wheel, which is Linux on ARM."""
 
+import os
+from functools import cache
 from importlib.util import find_spec
 from typing import Any, Protocol
 
@@ -39,9 +41,17 @@ def embree_scene(vertices: NDArray[np.floating[Any]], faces: NDArray[np.integer[
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene
 
-    scene: RayScene = EmbreeScene()
+    scene: RayScene = EmbreeScene(embree_device(os.getpid()))
     TriangleMesh(scene, vertices.astype(np.float32), faces)
     return scene
+
+
+@cache
+def embree_device(process: int) -> Any:
+    """The device of all scenes of a process: Embree crashes at about the thousandth, and some survive no fork."""
+    from embreex.rtcore import EmbreeDevice
+
+    return EmbreeDevice()
 
 
 class WarpScene:

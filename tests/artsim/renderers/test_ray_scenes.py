@@ -69,6 +69,20 @@ def test_depths_are_those_of_embree(category: str) -> None:
         np.testing.assert_allclose(depth[depth > 0], near[depth > 0] * obj.scale, rtol=2e-5)
 
 
+def test_thousands_of_scenes_live_in_one_process() -> None:
+    """Datasets of many small objects keep as many: a worker that made ArtSim-10K died of it."""
+    source = (
+        "import numpy as np\n"
+        "from artsim.renderers.ray_scenes import embree_scene\n"
+        "corners, faces = np.array([[-9, -9, 1], [9, -9, 1], [0, 9, 1.0]]), np.array([[0, 1, 2]])\n"
+        "scenes = [embree_scene(corners * [1, 1, n + 1], faces) for n in range(4000)]\n"
+        "ray = np.zeros((1, 3), np.float32), np.array([[0, 0, 1]], np.float32)\n"
+        "print([float(s.run(*ray, query='DISTANCE')[0]) for s in scenes] == [n + 1.0 for n in range(4000)])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (0, "True\n"), done.stderr
+
+
 @pytest.mark.slow
 def test_without_embreex_the_generator_makes_the_same_clouds_by_several_workers(tmp_path: Path) -> None:
     installed("warp")
