@@ -14,8 +14,9 @@ from artsim.export.options import ExportOptions
 from artsim.export.text import number, numbers, obj_text
 from artsim.model.robot import STRENGTH, BoxShape, Link, LinkJoint, MeshShape, Robot
 
-_SOLREF, _SOLIMP = "0.004 1", "0.9999 0.9999 0.001 0.5 2"
-"""As stiff as MuJoCo's time step of 2 ms allows."""
+STOP_TIME = 0.004
+"""Seconds, one over the natural frequency of a stop: as stiff as MuJoCo's time step of 2 ms allows."""
+_SOLREF, _SOLIMP = f"{STOP_TIME} 1", "0.9999 0.9999 0.001 0.5 2"
 STIFF = {"solref": _SOLREF, "solimp": _SOLIMP}
 """How stiffly joints follow others. MuJoCo weighs a metre of the one like a radian of the other, which by its default
 leaves a screw's thread far too soft."""
@@ -115,9 +116,8 @@ def _add_body(
     etree.SubElement(body, "inertial", pos=pos, mass=number(inertia.mass), fullinertia=numbers(entries))
     if joint is not None:
         more = {"range": numbers((joint.lower, joint.upper)), **STOP} if np.isfinite(joint.lower) else {}
-        # Beside their damping, this inertia keeps light keys calm, and out of their stops.
-        rotor = {"stiffness": joint.spring, "springref": 0.0, "armature": TIME_STEP**2 * joint.spring}
-        sprung = {name: number(value) for name, value in rotor.items()} if joint.spring else {}
+        keyed = {"stiffness": joint.spring, "springref": 0.0, "armature": rotor(joint)}
+        sprung = {name: number(value) for name, value in keyed.items()} if joint.spring else {}
         etree.SubElement(
             body,
             "joint",
@@ -145,6 +145,11 @@ def _add_body(
             body, "site", name=detail.name, type="box", size=numbers(0.5 * detail.size), group="4", **place
         )
     return body
+
+
+def rotor(joint: LinkJoint) -> float:
+    """Inertia (kg or kg m^2) that beside their damping keeps light sprung keys calm, and out of their stops."""
+    return TIME_STEP**2 * joint.spring
 
 
 def _add_geom(body: etree._Element, group: str, link: Link, shape: BoxShape | MeshShape) -> None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from artsim.common.extras import require_extra
 from artsim.common.names import unused_name
 from artsim.export.looks import NO_FINISH, Finish, Look
+from artsim.export.mjcf import STOP, STOP_TIME, rotor
 from artsim.export.options import ExportOptions
 from artsim.export.semantic_labels import add_labels
 from artsim.model.details import GRIPS
@@ -17,6 +18,8 @@ from artsim.model.robot import BoxShape, Link, LinkJoint, MeshShape, Robot
 
 STATIC_FRICTION, SLIDING_FRICTION = 0.5, 0.4
 """Of every surface: lacquered wood and plastic on rubber and steel have 0.3 to 0.6."""
+STOP_SHARE = 0.005
+"""Of its range, how far full effort presses a joint into its stop at most."""
 APPROACH = 0.06
 """Metres before a handle at which the line of a gripper's approach begins."""
 
@@ -275,6 +278,7 @@ def _add_joint(stage: Any, path: Any, joint: LinkJoint, robot: Robot, paths: lis
     if np.isfinite(joint.lower):
         added.CreateLowerLimitAttr(joint.lower * unit)
         added.CreateUpperLimitAttr(joint.upper * unit)
+    stop, blow = _stop(joint)
     drive = UsdPhysics.DriveAPI.Apply(added.GetPrim(), "linear" if slides else "angular")
     drive.CreateDampingAttr(joint.damping / unit)
     drive.CreateStiffnessAttr(joint.spring / unit)
@@ -290,12 +294,33 @@ def _add_joint(stage: Any, path: Any, joint: LinkJoint, robot: Robot, paths: lis
         (f"PhysxJointAxisAPI:{axis}", f"physxJointAxis:{axis}:dynamicFrictionEffort", joint.friction),
         ("NewtonJointAPI", "newton:velocityLimit", joint.velocity * unit),
         ("NewtonJointAPI", "newton:friction", joint.friction),
+        ("PhysxJointAPI", "physxJoint:armature", rotor(joint)),
+        ("NewtonJointAPI", "newton:armature", rotor(joint)),
+        ("NewtonJointAPI", "newton:limitStiffness", stop / unit),
+        ("NewtonJointAPI", "newton:limitDamping", blow / unit),
     ):
         prim.AddAppliedSchema(schema_name)
         prim.CreateAttribute(name, Sdf.ValueTypeNames.Float).Set(value)
+    prim.AddAppliedSchema("MjcJointAPI")
+    for name, text in STOP.items():
+        attribute = prim.CreateAttribute(f"mjc:{name}", Sdf.ValueTypeNames.DoubleArray, False, Sdf.VariabilityUniform)
+        attribute.Set([float(word) for word in text.split()])
     for name, value in (("spring", joint.spring), ("hold", joint.hold), ("holdOver", joint.hold_over)):
         if value:
             prim.CreateAttribute(f"artsim:{name}", Sdf.ValueTypeNames.Double).Set(value)
+
+
+def _stop(joint: LinkJoint) -> tuple[float, float]:
+    """Stiffness (N m/rad or N/m) and damping of a joint's stops, which do not bounce: it is critical.
+
+    Newton's own default is the same for a button and a drawer, and full effort takes a drawer far past it. A blow at
+    the velocity limit, at most the range in ``STROKE_TIME``, goes 0.7 % of the range past this stop. Newton's MuJoCo
+    solver softens it for blows, and so takes MuJoCo's own attributes, which say the same as the MJCF file.
+    """
+    stiffness = joint.inertia / STOP_TIME**2
+    if 0.0 < joint.upper - joint.lower < np.inf:
+        stiffness = max(stiffness, joint.effort / (STOP_SHARE * (joint.upper - joint.lower)))
+    return stiffness, 2.0 * np.sqrt(stiffness * joint.inertia)
 
 
 def _add_mimic(prim: Any, source: Any, slides: bool, multiplier: float, offset: float) -> None:

@@ -98,6 +98,8 @@ class LinkJoint:
     damping: float
     friction: float
     """N m s or N s/m; N m or N."""
+    inertia: float
+    """Of all that it carries at rest, along or about its axis: kg or kg m^2."""
     mimic: tuple[str, float, float] | None = None
     """Name of the joint followed, multiplier, offset."""
     spring: float = 0.0
@@ -268,14 +270,15 @@ def _link_joint(
     weight = carried.mass * GRAVITY
     if kind == "prismatic":
         effort, velocity = STRENGTH * weight, SLIDE_SPEED
-        damping, friction = carried.mass / DECAY, SLIDING_FRICTION * weight
+        inertia, friction = carried.mass, SLIDING_FRICTION * weight
     else:
-        moment = carried.about(origin, axis)
-        reach = np.sqrt(moment / carried.mass)
+        inertia = carried.about(origin, axis)
+        reach = np.sqrt(inertia / carried.mass)
         effort, velocity = STRENGTH * weight * reach, TURN_SPEED
-        damping, friction = moment / DECAY, weight * PIN_RADIUS * min(1.0, reach)
+        friction = weight * PIN_RADIUS * min(1.0, reach)
     if 0.0 < upper - lower < np.inf:
         velocity = min(velocity, (upper - lower) / STROKE_TIME)
     return LinkJoint(
-        name, kind, parent, child, axis, lower, upper, float(effort), float(velocity), damping, friction, mimic
-    )
+        name, kind, parent, child, axis, lower, upper, float(effort), float(velocity), inertia / DECAY, friction,
+        inertia, mimic,
+    )  # fmt: skip

@@ -69,6 +69,8 @@ def test_usd_has_the_bodies_masses_and_joints_of_the_object(tmp_path: Path) -> N
             "speed": prims[joint.name].GetAttribute("physxJoint:maxJointVelocity").Get() / unit,
             "friction": prims[joint.name].GetAttribute(f"physxJointAxis:{kind}:dynamicFrictionEffort").Get(),
         }
+        stop = prims[joint.name].GetAttribute("newton:limitStiffness").Get() * unit
+        assert joint.effort / stop <= 0.0051 * (joint.upper - joint.lower)  # full effort hardly passes a limit
         assert written == pytest.approx({"drive": joint.effort, "speed": joint.velocity, "friction": joint.friction})
     assert prims["cap_slide"].GetAttribute("artsim:mimic:multiplier").Get() == pytest.approx(0.002)
     assert prims["cap_slide"].GetRelationship("artsim:mimic:joint").GetTargets()[0].name == "cap_joint"
