@@ -1,9 +1,11 @@
 """Do simulators agree on exported objects? ``python -m benchmarks.simulators``.
 
-Exports objects of every category with motors, and loads each into PyBullet, MuJoCo and SAPIEN. Compared with artsim are
-numbers of links and joints, and the places of all parts at random states. With ``--seconds``, every free joint of some
-objects is driven for so long with its full effort, as far as its velocity limit allows, once each way: in MuJoCo by the
-file's motors, in PyBullet and SAPIEN by velocity drives as strong as the effort limit, and in artsim's own physics.
+Exports objects of every category with motors, and loads each into PyBullet and SAPIEN (URDF), MuJoCo and MuJoCo Warp
+(MJCF), and Newton (USD), these two on the CPU. Compared with artsim are numbers of links and joints, and the places
+of all parts at random states. With ``--seconds``, every free joint of some objects is driven for so long with its full
+effort, as far as its velocity limit allows, once each way: in MuJoCo and MuJoCo Warp by the file's motors, in Newton,
+whose MuJoCo solver moves it, by drives equal to these, in PyBullet and SAPIEN by velocity drives as strong as the
+effort limit, and in artsim's own physics.
 Printed are the largest overshoot of a limit over the joint's range, the largest speed over its limit, and how far from
 artsim's own the states at the end are. The last line is one JSON object.
 """
@@ -18,30 +20,33 @@ from typing import Any
 
 import numpy as np
 import tyro
+from scipy.spatial.transform import Rotation
 
 from artsim import make
 from artsim.common.extras import import_pybullet, silence_output
 from artsim.common.progress import say, track
 from artsim.export import FORMATS, export
+from artsim.export.mjcf import BELOW
 from artsim.export.options import ExportOptions
 from artsim.families import FAMILIES
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
-from artsim.model.robot import LinkJoint, as_robot
-from artsim.physics import PhysicsOptions, Simulation
-from artsim.physics.simulators import AGREEMENT, Agreement, compare_simulators
+from artsim.model.robot import STRENGTH, LinkJoint, as_robot
+from artsim.model.transforms import compose_transform
+from artsim.physics import PhysicsOptions, Simulation, simulators
+from artsim.physics.simulators import AGREEMENT, Agreement, LoadedFile, compare_simulators
 
 _DRIVE = 1e6
 """Damping of SAPIEN's drives: their force limit is what acts."""
 _RATE = 480
-"""Steps a second of PyBullet and SAPIEN."""
+"""Steps a second of PyBullet, SAPIEN and Newton."""
 _ALLOWED = {"overshoot": 0.02, "speed": 1.02, "apart": 0.01}
 """Of the range, of the speed limit, of the range."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """Load exported objects into three simulators, and drive them."""
+    """Load exported objects into five simulators, and drive them."""
 
     objects: int = 200
     """Objects over all categories."""
@@ -132,10 +137,120 @@ def in_sapien(folder: Path, joints: list[LinkJoint], way: float, seconds: float)
     return np.array(states, dtype=np.float64), np.array(speeds, dtype=np.float64)
 
 
+def newton_model(folder: Path) -> Any:
+    """Newton's builder with the USD file, and the first degree of freedom of each joint by name."""
+    import newton
+    import warp
+
+    warp.config.quiet = True
+    builder = newton.ModelBuilder()
+    newton.solvers.SolverMuJoCo.register_custom_attributes(builder)
+    with silence_output():
+        builder.add_usd(str(folder / FORMATS["usd"]))
+    starts = zip(builder.joint_label, builder.joint_qd_start, strict=True)
+    return builder, {label.rsplit("/", 1)[-1]: start for label, start in starts}
+
+
+def in_newton(folder: Path, joints: list[LinkJoint], way: float, seconds: float) -> Run:
+    """By velocity drives that are the motors of the MJCF file: their force falls from the effort limit with speed."""
+    import newton
+
+    builder, places = newton_model(folder)
+    chosen = [places[joint.name] for joint in joints]
+    for joint, place in zip(joints, chosen, strict=True):
+        builder.joint_target_mode[place] = newton.JointTargetMode.POSITION_VELOCITY  # the position is a spring's
+        lost = builder.joint_target_kd[place] = (1.0 + 1.0 / STRENGTH) * joint.effort / joint.velocity
+        builder.joint_target_qd[place] = way * BELOW * joint.effort / lost
+    with silence_output():
+        model = builder.finalize(device="cpu")
+        solver = newton.solvers.SolverMuJoCo(model, use_mujoco_cpu=True, disable_contacts=True)
+    state, after, control = model.state(), model.state(), model.control()
+    seen = []
+    for _ in range(round(_RATE * seconds)):
+        solver.step(state, after, control, None, 1 / _RATE)
+        state, after = after, state
+        seen.append((state.joint_q.numpy()[chosen], state.joint_qd.numpy()[chosen]))
+    states, speeds = zip(*seen, strict=True)
+    return np.array(states, dtype=np.float64), np.array(speeds, dtype=np.float64)
+
+
+def newton_file(file: Path) -> LoadedFile:
+    """The USD file beside a URDF file, in Newton."""
+    import newton
+
+    builder, places = newton_model(file.parent)
+    moving = {name: place for name, place in places.items() if not name.startswith("fixed_base")}
+    model = builder.finalize(device="cpu")
+    state, bodies = model.state(), [label.rsplit("/", 1)[-1] for label in builder.body_label]
+
+    def poses(values: dict[str, float]) -> dict[str, Array]:
+        q = np.zeros(model.joint_coord_count, np.float32)
+        q[list(moving.values())] = [values[name] for name in moving]
+        state.joint_q.assign(q)
+        newton.eval_fk(model, state.joint_q, state.joint_qd, state)
+        found = state.body_q.numpy().astype(np.float64)
+        return {
+            name: compose_transform(pose[:3], Rotation.from_quat(pose[3:]).as_matrix())
+            for name, pose in zip(bodies, found, strict=True)
+        }
+
+    return LoadedFile(len(bodies), len(moving), poses)
+
+
+def in_mujoco_warp(folder: Path, joints: list[LinkJoint], way: float, seconds: float) -> Run:
+    """By the motors of the MJCF file, each at full control."""
+    import mujoco
+    import mujoco_warp
+    import warp
+
+    warp.config.quiet = True
+    model = mujoco.MjModel.from_xml_path(str(folder / FORMATS["mjcf"]))
+    data = mujoco.MjData(model)
+    data.ctrl[:] = way
+    places = [model.joint(joint.name).qposadr[0] for joint in joints]
+    degrees = [model.joint(joint.name).dofadr[0] for joint in joints]
+    seen = []
+    with warp.ScopedDevice("cpu"), silence_output():
+        there, moving = mujoco_warp.put_model(model), mujoco_warp.put_data(model, data)
+        for _ in range(round(seconds / model.opt.timestep)):
+            mujoco_warp.step(there, moving)
+            seen.append((moving.qpos.numpy()[0, places], moving.qvel.numpy()[0, degrees]))
+    states, speeds = zip(*seen, strict=True)
+    return np.array(states, dtype=np.float64), np.array(speeds, dtype=np.float64)
+
+
+def mujoco_warp_file(file: Path) -> LoadedFile:
+    """The MJCF file beside a URDF file, in MuJoCo Warp."""
+    import mujoco
+    import mujoco_warp
+    import warp
+
+    model = mujoco.MjModel.from_xml_path(str(file.parent / FORMATS["mjcf"]))
+    data = mujoco.MjData(model)
+    joints = [model.joint(j) for j in range(model.njnt)]
+    bodies = [model.body(b) for b in range(1, model.nbody)]
+    with warp.ScopedDevice("cpu"):
+        there = mujoco_warp.put_model(model)
+
+    def poses(values: dict[str, float]) -> dict[str, Array]:
+        for joint in joints:
+            data.qpos[joint.qposadr[0]] = values[joint.name]
+        with warp.ScopedDevice("cpu"):
+            moved = mujoco_warp.put_data(model, data)
+            mujoco_warp.kinematics(there, moved)
+        places, turns = moved.xpos.numpy()[0].astype(np.float64), moved.xmat.numpy()[0].astype(np.float64)
+        return {body.name: compose_transform(places[body.id], turns[body.id].reshape(3, 3)) for body in bodies}
+
+    return LoadedFile(model.nbody - 1, model.njnt, poses)
+
+
+simulators.SIMULATORS.update({"mujoco_warp": mujoco_warp_file, "newton": newton_file})
 SIMULATORS: dict[str, Callable[[Path, list[LinkJoint], float, float], Run]] = {
     "mujoco": in_mujoco,
     "pybullet": in_pybullet,
     "sapien": in_sapien,
+    "mujoco_warp": in_mujoco_warp,
+    "newton": in_newton,
 }
 
 
@@ -176,8 +291,8 @@ def main(options: Options) -> None:
         category, seed = categories[i % len(categories)], options.first_seed + i // len(categories)
         obj = make(category, seed)
         with tempfile.TemporaryDirectory() as folder:
-            export(obj, Path(folder), ["urdf", "mjcf"], options=ExportOptions(actuators="motor"))
-            for agreement in compare_simulators(folder, options.states):
+            export(obj, Path(folder), ["urdf", "mjcf", "usd"], options=ExportOptions(actuators="motor"))
+            for agreement in compare_simulators(folder, options.states, simulators=tuple(SIMULATORS)):
                 agreements[agreement.simulator].append(agreement)
                 if agreement.problem:
                     say(f"{category}:{seed} in {agreement.simulator}: {agreement.problem}")
@@ -199,7 +314,7 @@ def main(options: Options) -> None:
             result[name]["within"] = {
                 key: float(np.mean([row[key] <= most for row in drives[name]])) for key, most in _ALLOWED.items()
             }
-        print(f"{name:10s}{result[name]}")
+        print(f"{name:12s}{result[name]}")
     print(json.dumps(result))
 
 
