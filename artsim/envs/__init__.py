@@ -1,6 +1,7 @@
 """Environments for reinforcement learning, registered when this package is imported.
 
 ``artsim/Articulated-v0`` (gymnasium): :class:`artsim.envs.articulated.ArticulatedEnv`.
+``artsim/Opening-v0`` (gymnasium, vectors): :class:`artsim.envs.opening.OpeningVectorEnv`.
 ``ArtSimArticulated-v1`` (ManiSkill 3): :mod:`artsim.envs.maniskill`, of which nothing heavy is imported before use.
 """
 
@@ -33,6 +34,11 @@ gymnasium.register(
     id="artsim/Articulated-v0",
     entry_point="artsim.envs.articulated:ArticulatedEnv",
     additional_wrappers=(WrapperSpec("ObeyTimeLimit", "artsim.envs.articulated:ObeyTimeLimit", {}),),
+)
+gymnasium.register(
+    id="artsim/Opening-v0",
+    entry_point="artsim.envs.opening:OpeningEnv",
+    vector_entry_point="artsim.envs.opening:OpeningVectorEnv",
 )
 # As ManiSkill's register_env does, which would have to import it: its own time limit knows batches.
 _TIME_LIMIT = WrapperSpec(

@@ -205,9 +205,13 @@ def sample_view(
     options, rng = options or ViewOptions(), rng or np.random.default_rng(0)
     if options.custom is not None:
         return view_sampler(options.custom)(rng, obj, np.asarray(q, dtype=np.float64))
+    return sphere_view(*bounding_sphere(obj, q), options, rng)
+
+
+def sphere_view(center: Array, radius: float, options: ViewOptions, rng: np.random.Generator) -> Camera:
+    """Draw a camera that looks at a sphere, centre (3,) and radius in metres, from where it fits the image."""
     azimuth, elevation = options.draw_directions(rng)
     fill = rng.uniform(*options.fill)
-    center, radius = bounding_sphere(obj, q)
     fov_y = np.deg2rad(options.fov)
     distance = radius / half_width(options, fill)
     level = cos(elevation)

@@ -166,6 +166,22 @@ def _nearest(
     return found
 
 
+def part_depths(
+    posed: PosedObject, parts: Sequence[int], row: NDArray[np.int64], column: NDArray[np.int64]
+) -> NDArray[np.float32]:
+    """(N,) z-depth in metres of the nearest of one or more parts at the centre of each pixel; 0 where there is none.
+
+    It needs no spans: rays that are known can be cast again and again at what moves.
+    """
+    count, parts = len(row), list(parts)
+    ends = count * np.arange(len(parts) + 1)
+    many = np.tile(row, len(parts)), np.tile(column, len(parts))
+    directions = ray_kernels.part_directions(*many, ends, posed.rotations[parts], posed.intrinsics)
+    distance = _cast_directions(posed, parts, directions, ends).reshape(len(parts), count).min(axis=0)
+    depth: NDArray[np.float32] = np.where(distance < _MISS, distance * np.float32(posed.obj.scale), np.float32(0.0))
+    return depth
+
+
 def hit_faces(posed: PosedObject, k: int, row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.int64]:
     """(N,) first face of part k that the ray through the centre of each pixel meets; -1 where it meets none."""
     ends = np.array([0, len(row)])
