@@ -36,6 +36,7 @@ MODULES = {
     "psutil": ("psutil", "sim"),
     "yourdfpy": ("yourdfpy", "sim"),
     "h5py": ("h5py", "formats"),
+    "pyarrow": ("pyarrow", "formats"),
     "ray": ("Ray", "ray"),
     "fsspec": ("fsspec", "storage"),
     "s3fs": ("s3fs", "storage"),

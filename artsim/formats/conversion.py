@@ -19,7 +19,13 @@ from artsim.errors import ConfigError
 from artsim.formats.base import Format, FormatName, Piece
 from artsim.formats.bop import BopFormat
 from artsim.formats.coco import CocoFormat
+from artsim.formats.gapartnet import GapartnetFormat
 from artsim.formats.hdf5 import Hdf5Format
+from artsim.formats.huggingface import HuggingFaceFormat
+from artsim.formats.op_align import OpAlignFormat
+from artsim.formats.particulate import ParticulateFormat
+from artsim.formats.singapo import SingapoFormat
+from artsim.formats.two_state import TwoStateFormat
 from artsim.formats.webdataset import WebDatasetFormat
 from artsim.model.ply import cloud_ply
 from artsim.observing.sample import Sample
@@ -43,6 +49,12 @@ FORMATS: dict[FormatName, Format] = {
     "coco": CocoFormat(),
     "hdf5": Hdf5Format(),
     "ply": PlyFormat(),
+    "huggingface": HuggingFaceFormat(),
+    "op-align": OpAlignFormat(),
+    "particulate": ParticulateFormat(),
+    "singapo": SingapoFormat(),
+    "gapartnet": GapartnetFormat(),
+    "two-state": TwoStateFormat(),
 }
 
 DONE = "conversion.json"
@@ -60,9 +72,11 @@ class ConvertResult:
     ----------
     folder : Path
     num_samples : int
-        Of the whole conversion.
+        Of the whole conversion; objects, in a format of objects alone.
     made : int
-        Samples converted by this call.
+        Those converted by this call.
+    unit : str
+        What is counted: "sample" or "object".
     files : int
         Of the whole conversion, without ``conversion.json``.
     seconds : float
@@ -73,6 +87,7 @@ class ConvertResult:
     made: int
     files: int
     seconds: float
+    unit: str = "sample"
 
 
 def convert(
@@ -135,18 +150,16 @@ def convert(
         "samples": sorted(set(samples)),
         "group": group,
     }
-    total = sum(len(piece.members) for piece in pieces if piece.split)
-    tasks = {
-        piece.name: Task(convert_piece, (source.folder, to, piece), len(piece.members) if piece.split else 0)
-        for piece in pieces
-    }
+    counted = FORMATS[to].converts_samples
+    sizes = {piece.name: len(piece.members) if bool(piece.split) == counted else 0 for piece in pieces}
+    tasks = {piece.name: Task(convert_piece, (source.folder, to, piece), sizes[piece.name]) for piece in pieces}
 
     def finish(values: dict[str, Any], output: Output) -> None:
         FORMATS[to].finish(source, [(piece, values[piece.name]) for piece in pieces], output)
 
-    run = Run(folder, recipe, DONE, "conversion", "sample", progress=progress)
+    run = Run(folder, recipe, DONE, "conversion", "sample" if counted else "object", progress=progress)
     files, made = run_tasks(run, tasks, workers, finish)
-    return ConvertResult(folder, total, made, len(files), time.perf_counter() - start)
+    return ConvertResult(folder, sum(sizes.values()), made, len(files), time.perf_counter() - start, run.unit)
 
 
 def _pieces(source: Dataset, to: FormatName, split: str | None, samples: Sequence[int], group: int) -> list[Piece]:
@@ -168,7 +181,7 @@ def _pieces(source: Dataset, to: FormatName, split: str | None, samples: Sequenc
     pieces = []
     if FORMATS[to].converts_objects:
         pieces += _cut("", [i for i, planned in enumerate(plan.objects) if planned.key in shown], _OBJECTS_AT_ONCE)
-    for name, positions in members.items():
+    for name, positions in members.items() if FORMATS[to].converts_samples else ():
         pieces += _cut(name, positions, group)
     return pieces
 

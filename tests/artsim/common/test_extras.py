@@ -54,6 +54,7 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
             ("imaged --to bop --workers 1 --out bop", ""),
             ("imaged --to coco --workers 1 --out coco", ""),
             ("imaged --to hdf5 --workers 1 --out hdf5", "formats"),
+            ("made --to huggingface --workers 1 --out parquet", "formats"),
         ],
         "families": [("globe", "")],
         "vary": [("box.urdf --count 1 --out varied", "sim")],
