@@ -13,6 +13,7 @@ from artperl.commands.estimate import Estimate
 from artperl.commands.evaluate import Evaluate
 from artperl.commands.reartmix import ReArtMix
 from artperl.commands.report import Report
+from artperl.commands.score import Score
 from artperl.commands.train import Train
 from artperl.commands.train_detector import TrainDetector
 from artsim.common.program import run_program
@@ -26,6 +27,7 @@ Verb = (
     | Annotated[ReArtMix, tyro.conf.subcommand("reartmix")]
     | Annotated[Ablation, tyro.conf.subcommand("ablation")]
     | Annotated[Estimate, tyro.conf.subcommand("estimate")]
+    | Annotated[Score, tyro.conf.subcommand("score")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
     | Annotated[MakeDetections, tyro.conf.subcommand("detections")]

@@ -1,6 +1,7 @@
 """The program ``artsim``: datasets, objects, grasps, variations, motions, scenes; checks, pictures, formats."""
 
 from artsim.commands.convert import Convert
+from artsim.commands.dataset import Dataset
 from artsim.commands.doctor import Doctor
 from artsim.commands.export import Export
 from artsim.commands.generate import Generate
@@ -15,8 +16,8 @@ from artsim.commands.view import Gallery, View
 from artsim.common.program import run_program
 
 Verb = (
-    Generate | Gallery | Families | GenerateObjects | Export | Grasps | Vary | Record | Scene | View | Inspect | Verify
-    | Repair | Merge | Convert | Doctor
+    Generate | Dataset | Gallery | Families | GenerateObjects | Export | Grasps | Vary | Record | Scene | View | Inspect
+    | Verify | Repair | Merge | Convert | Doctor
 )  # fmt: skip
 
 

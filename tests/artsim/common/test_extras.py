@@ -36,6 +36,7 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
             ("--objects box.urdf --out imaged --num-samples 4 --workers 1 --images depth part_mask", ""),
             ("--objects box.urdf --out bullet --num-samples 4 --workers 1 --renderer pybullet", "pybullet"),
         ],
+        "dataset": [("--help", "")],
         "gallery": [("--categories globe --states 1 --out gallery.png", "")],
         "generate-objects": [
             ("--category globe --count 1 --workers 1 --out urdf", ""),
@@ -74,6 +75,7 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
         "detections": [("--help", "")],
         "train-detector": [("--out detector", "detect")],
         "report": [("--help", "")],
+        "score": [("poses.jsonl --data made", "train"), ("--help", "")],
     },
 }
 """Command lines of every verb, and the extra that each wants."""

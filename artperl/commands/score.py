@@ -1,0 +1,58 @@
+"""The verb ``artperl score``."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from artsim.common.outputs import check_output, write_output
+from artsim.runs.kept import write_kept
+
+
+@dataclass(frozen=True)
+class Score:
+    """Score anybody's estimates against a dataset, such as the test split of ArtSim-10K, and write a page.
+
+    A file of estimates is a JSON list, or has a JSON record in each line: what artperl estimate writes of a dataset.
+    Samples without an estimate count as failures. Errors are up to symmetry.
+
+    Example: artsim dataset artsim-10k --splits test --out out/artsim-10k
+
+    Then: artperl score predictions.json --data out/artsim-10k/test --out page.md
+    """
+
+    predictions: tyro.conf.Positional[tuple[Path, ...]]
+    """Files of estimates, one for each method; a method has the name of its file."""
+    data: Path
+    """Folder of the dataset."""
+    out: Path | None = None
+    """Write the page, Markdown, to this file; by default it is printed."""
+    json: Path | None = None
+    """Write the figures to this file."""
+
+    def run(self) -> None:
+        from artperl.evaluation.predictions import page, read_predictions, score_predictions, symmetries_of
+        from artperl.evaluation.tables import summary
+        from artsim.datasets.dataset import open_dataset
+        from artsim.datasets.frozen import frozen_name
+
+        for path in (self.out, self.json):
+            if path is not None:
+                check_output(path, self.predictions)
+        read = [read_predictions(path) for path in self.predictions]
+        dataset = open_dataset(self.data)
+        symmetric = symmetries_of(dataset)
+        scored = {own.name: score_predictions(own, dataset, symmetric) for own in read}
+        title = frozen_name(dataset) or f"{self.data.name}, no frozen dataset"
+        notes = [
+            f"{len(dataset)} views of {len(dataset.plan.objects)} objects. A view without an estimate is a failure: "
+            "half a turn, one diagonal, no overlap.",
+            "Right: every part within 10 degrees and 5 % of the diagonal. Errors of parts, up to symmetry.",
+        ]
+        text = page(title, scored, notes)
+        write_kept(self.json, {name: summary(own) for name, own in scored.items()}, indent=1)
+        if self.out is None:
+            print(text)
+        else:
+            write_output(self.out, text.encode(), self.predictions)
+            print(f"{self.out}: {', '.join(scored)} against {title}")
