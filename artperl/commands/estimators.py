@@ -14,19 +14,14 @@ def estimator_folder(name: str) -> Path:
     ConfigError
         When there is none.
     """
-    from artperl.methods.estimator_files import WEIGHTS, folder_of
+    from artperl.methods.estimator_files import estimator_fix, folder_of
 
     settings = "estimator.json"
     for folder in (folder_of(name), Path(name) / "best"):
         if (folder / settings).is_file():
             return folder
-    shipped = ", ".join(sorted(path.parent.name for path in WEIGHTS.glob(f"*/{settings}")))
     what = "holds no estimator" if Path(name).is_dir() else "is no estimator"
-    raise ConfigError(
-        f"{name!r} {what}",
-        "category",
-        f"use one that comes with the package ({shipped}), or a folder that train.py wrote",
-    )
+    raise ConfigError(f"{name!r} {what}", "category", estimator_fix(name))
 
 
 def named_estimators(texts: Sequence[str]) -> dict[str, str | Path]:

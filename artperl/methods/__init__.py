@@ -8,6 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Literal, get_args
 
+from artsim.common.names import name_fix
 from artsim.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def method_of(name: str) -> type[Method]:
         When there is no method of that name.
     """
     if name not in METHODS:
-        raise ConfigError(f"there is no method {name!r}", "method", f"use one of {', '.join(METHODS)}")
+        raise ConfigError(f"there is no method {name!r}", "method", name_fix(name, METHODS))
     module, name_of_class = METHODS[name].split(":")
     found: type[Method] = getattr(import_module(module), name_of_class)
     return found

@@ -29,7 +29,7 @@ from artperl.retrieval.box_embedding import EMBEDDED
 from artperl.retrieval.shape_base_file import read_shape_base
 from artsim.common.files import read_bounded, read_json
 from artsim.common.json_records import from_json_values
-from artsim.common.names import printable
+from artsim.common.names import name_fix, printable
 from artsim.errors import ConfigError, DatasetError
 from artsim.model.objects import MAX_PARTS
 
@@ -287,10 +287,7 @@ def read_settings(folder: Path) -> dict[str, Any]:
         When there is none, or it was written by another version.
     """
     if not (folder / SETTINGS).exists():
-        shipped = ", ".join(sorted(path.parent.name for path in WEIGHTS.glob(f"*/{SETTINGS}"))) or "none"
-        raise DatasetError(
-            "there is no estimator", folder, f"train one, or use one that comes with the package: {shipped}"
-        )
+        raise DatasetError("there is no estimator", folder, estimator_fix(folder.name))
     # An option, or a figure of its training, may be infinite.
     settings = read_json(folder / SETTINGS, SETTINGS, DatasetError, _MAX_SETTINGS_BYTES, finite=False)
     if not isinstance(settings, dict) or not isinstance(settings.get("about"), dict):
@@ -303,6 +300,15 @@ def read_settings(folder: Path) -> dict[str, Any]:
             if isinstance(values.get(name), dict):
                 values[name] = {_RENAMED.get(key, key): value for key, value in values[name].items()}
     return settings
+
+
+def estimator_fix(name: str) -> str:
+    """What to do where there is no estimator of a name."""
+    shipped = sorted(path.parent.name for path in WEIGHTS.glob(f"*/{SETTINGS}"))
+    for of in shipped:
+        if name in read_settings(WEIGHTS / of)["about"].get("options", {}).get("categories", ()):
+            return f"use {of}, which covers {name} and comes with the package, or a folder that train.py wrote"
+    return f"{name_fix(name, shipped)}, which come with the package, or a folder that train.py wrote"
 
 
 _RENAMED = {"doubt": "expected_error", "foreign": "outlier_share"}

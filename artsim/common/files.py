@@ -85,6 +85,9 @@ def write_error(error: OSError, path: Path) -> ArtsimError:
     """The readable form of an operating-system error on writing ``path``."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return ConfigError("the disk is full", path, "free some space and run the same command again: it resumes")
+    in_the_way = next((each for each in (path, *path.parents) if each.is_file()), None)
+    if in_the_way is not None and error.errno in (errno.EEXIST, errno.ENOTDIR):
+        return ConfigError("it is a file, where a folder is to be written", in_the_way, "name another folder for --out")
     return ConfigError(f"cannot write ({error.strerror})", path, "choose another folder or correct its permissions")
 
 

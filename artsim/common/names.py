@@ -1,10 +1,11 @@
 """Text out of files that nobody vouches for, made safe to print and to name files after."""
 
+import difflib
 import hashlib
 import io
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TextIO
 
 _MAX_NAME = 60
@@ -106,6 +107,13 @@ def numbered(names: Sequence[str]) -> list[str]:
         seen[name] += 1
         texts.append(f"{name} {seen[name]}" if total[name] > 1 else name)
     return texts
+
+
+def name_fix(asked: object, known: Iterable[str]) -> str:
+    """How to mend a name that is not known: by the one that it is a slip of, such as ``Laptop``, or by any other."""
+    names = list(known)
+    near = difflib.get_close_matches(re.sub(r"[\s-]", "_", str(asked).lower()[:_MAX_NAME]), names, 1, 0.7)
+    return f"{f'did you mean {near[0]}? Else ' if near else ''}use one of {', '.join(names)}"
 
 
 def is_number(text: str) -> bool:

@@ -12,6 +12,7 @@ from importlib import import_module
 
 import numpy as np
 
+from artsim.common.names import name_fix
 from artsim.errors import AssetError, ConfigError
 from artsim.families.constraints import Constraints, Given
 from artsim.families.physical import with_physics
@@ -217,7 +218,7 @@ _OTHER = 0.3
 
 def _check(category: str, seed: int, draw: int = 0) -> None:
     if category not in FAMILIES:
-        raise ConfigError(f"there is no category {category!r}", fix=f"use one of {', '.join(sorted(FAMILIES))}")
+        raise ConfigError(f"there is no category {category!r}", fix=name_fix(category, sorted(FAMILIES)))
     if min(seed, draw) < 0:
         raise ConfigError(f"seed {min(seed, draw)} is negative", fix="use 0 or more")
 

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from textwrap import wrap
 
+from artsim.common.names import name_fix
 from artsim.errors import ConfigError
 from artsim.families import FAMILIES, draws_of
 from artsim.families.constraints import FEATURES, LENGTHS, described, measured, measured_length
@@ -24,7 +25,7 @@ def parameters(category: str) -> str:
         When there is no such category.
     """
     if category not in FAMILIES:
-        raise ConfigError(f"there is no category {category!r}", fix=f"use one of {', '.join(sorted(FAMILIES))}")
+        raise ConfigError(f"there is no category {category!r}", fix=name_fix(category, sorted(FAMILIES)))
     return inspect.cleandoc(sys.modules[FAMILIES[category].__module__].__doc__ or "")
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from artsim.common.files import file_sha256
+from artsim.common.names import name_fix
 from artsim.datasets.dataset import Dataset
 from artsim.datasets.description import DESCRIPTION
 from artsim.datasets.shards import sample_key
@@ -133,7 +134,7 @@ def convert(
     start = time.perf_counter()
     source = Dataset(dataset.folder if isinstance(dataset, Dataset) else dataset)
     if to not in get_args(FormatName):
-        raise ConfigError(f"there is no format {to!r:.40}", "to", f"use one of {', '.join(FORMATS)}")
+        raise ConfigError(f"there is no format {to!r:.40}", "to", name_fix(to, FORMATS))
     if split not in (None, *SPLITS):
         raise ConfigError(f"there is no split {split!r:.40}", "split", f"use one of {', '.join(SPLITS)}")
     check_counts(group=group, workers=workers)

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from artsim.common.names import name_fix
 from artsim.common.sequences import listed
 from artsim.errors import AssetError, ConfigError
 from artsim.families import FAMILIES
@@ -62,7 +63,7 @@ def family_sources(
     unknown = sorted(set(categories) - FAMILIES.keys())
     if unknown:
         raise ConfigError(
-            f"there is no category {', '.join(unknown)}", "categories", f"use {', '.join(sorted(FAMILIES))}, or all"
+            f"there is no category {', '.join(unknown)}", "categories", name_fix(unknown[0], [*sorted(FAMILIES), "all"])
         )
     if objects_per_category < 1:
         raise ConfigError(f"{objects_per_category} is not a count", "objects_per_category", "use 1 or more")

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from artsim.common.names import name_fix
 from artsim.errors import ConfigError
 from artsim.model.camera import Camera
 from artsim.model.kinematics import Array
@@ -163,5 +164,5 @@ def find_sensor(noise: str | Sensor) -> Sensor:
     if isinstance(noise, Sensor):
         return noise
     if noise not in SENSORS:
-        raise ConfigError(f"there is no sensor {noise!r}", "noise", f"use one of {', '.join(SENSORS)}")
+        raise ConfigError(f"there is no sensor {noise!r}", "noise", name_fix(noise, SENSORS))
     return SENSORS[noise]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from numpy.typing import ArrayLike
 
+from artsim.common.names import name_fix
 from artsim.errors import ConfigError
 from artsim.model.camera import Camera
 from artsim.model.frame import Frame
@@ -39,7 +40,7 @@ def make_renderer(name: str) -> Renderer:
         When its backend is not installed or does not start.
     """
     if name not in RENDERERS:
-        raise ConfigError(f"there is no renderer {name!r}", "renderer", f"use one of {', '.join(RENDERERS)}")
+        raise ConfigError(f"there is no renderer {name!r}", "renderer", name_fix(name, RENDERERS))
     module, _, kind = RENDERERS[name].partition(":")
     renderer: Renderer = getattr(import_module(module), kind)()
     return renderer
