@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import orjson
-import trimesh
 from lxml import etree
 
 from artsim.formats.base import ObjectFormat
@@ -36,6 +35,8 @@ class GapartnetFormat(ObjectFormat):
 
     def object_files(self, obj: ArticulatedObject) -> Iterator[tuple[str, bytes]]:
         """The files of an object."""
+        import trimesh
+
         links = links_of(obj)
         names = [f"link_{k}" for k in range(len(links))]
         kinds = [gapart_of(link) for link in links]

@@ -8,7 +8,6 @@ import io
 from collections.abc import Iterator
 
 import numpy as np
-import trimesh
 
 from artsim.formats.base import ObjectFormat
 from artsim.model.joints import ROTATING
@@ -36,6 +35,8 @@ def particulate_npz(obj: ArticulatedObject, num_points: int = _POINTS) -> bytes:
     point p of the axis; ``prismatic_axis`` (K, 3); ranges (K, 2) from the rest state, radians and lengths. A screw is
     both.
     """
+    import trimesh
+
     size = 1.0 / float((obj.bounds[1] - obj.bounds[0]).max())
     middle = obj.bounds.mean(axis=0)
     mesh = trimesh.util.concatenate([obj.part_mesh(k) for k in range(len(obj))])

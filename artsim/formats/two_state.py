@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import orjson
-import trimesh
 from numpy.typing import NDArray
 
 from artsim.formats.base import ObjectFormat
@@ -98,6 +97,8 @@ def trans_info(obj: ArticulatedObject, joint: int, states: tuple[Array, Array]) 
 
 def _meshes(obj: ArticulatedObject, joint: int, name: str, q: Array) -> Iterator[tuple[str, bytes]]:
     """Ground truth of a state: the whole, what stays, and what moves. Names end in what their readers expect."""
+    import trimesh
+
     T = obj.tree.forward_kinematics(q)
     carried = {joint}
     for k in range(joint + 1, len(obj)):  # parents come first

@@ -117,6 +117,6 @@ def test_a_page_holds_the_cloud_and_every_box_of_the_way(sample: Sample) -> None
     assert len(data["frames"]) == len(estimate.trajectory)
     last = data["frames"][-1]
     assert len(np.frombuffer(base64.b64decode(last["part"]), "<i2")) == np.isfinite(sample.points).all(axis=1).sum()
-    centers = [np.array(box["T"]) @ [*box["center"], 1.0] for box in last["boxes"]]
+    centers = [np.array(box["T"]) @ [*box["center"], 1.0] for box in last["shown"]["boxes"]]
     np.testing.assert_allclose(np.array(centers)[:, :3], estimate.translation, atol=1e-4)
     assert estimate._repr_html_().startswith("<iframe")

@@ -73,8 +73,8 @@ def test_an_estimator_in_python_says_it_too_and_leaves_the_origin_out(estimator:
     assert "1 warnings" in repr(with_zeros)
     text = str(with_zeros)
     assert len(text.splitlines()) == 5
-    assert text.splitlines()[2].split()[:2] == ["base", "free"]
-    assert text.splitlines()[3].split()[:2] == ["lid", "revolute"]
+    assert text.splitlines()[3].split()[:2] == ["base", "free"]
+    assert text.splitlines()[4].split()[:2] == ["lid", "revolute"]
 
 
 @pytest.mark.parametrize("method", ["full", "artperl"])

@@ -267,7 +267,7 @@ def test_a_full_disk_loses_nothing(whole: Path, tmp_path: Path, monkeypatch: pyt
 
 def test_curves_that_cannot_be_written_are_told(tmp_path: Path) -> None:
     (tmp_path / "events").write_text("not a folder")
-    with pytest.raises(ArtsimError, match=r"events: cannot write"):
+    with pytest.raises(ArtsimError, match=r"events: it is a file, where a folder"):
         Training(OPTIONS, tmp_path, workers=0, progress=False).run()
 
 

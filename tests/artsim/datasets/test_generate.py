@@ -247,7 +247,7 @@ def test_files_of_one_name_are_different_objects(sources: list[Source], tmp_path
 
 def test_unwritable_places_are_clear_errors(sources: list[Source], tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(ArtsimError, match="cannot write"):
+    with pytest.raises(ArtsimError, match="it is a file, where a folder"):
         make(sources, tmp_path / "file" / "out")
 
 

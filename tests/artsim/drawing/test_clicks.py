@@ -192,6 +192,7 @@ def test_dark_follows_the_system_and_the_button(opened: Opened) -> None:
     for scheme in ("light", "dark"):
         page.emulate_media(color_scheme=scheme)
         page.wait_for_function(f"matchMedia('(prefers-color-scheme: {scheme})').matches")
+        picture(page)  # a frame, with which the browser tells of the change
         page.wait_for_function(f"document.documentElement.dataset.theme === '{scheme}'")
     assert picture(page)[5, 5].max() < 60
 

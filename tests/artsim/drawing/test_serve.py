@@ -153,7 +153,14 @@ def test_openness_is_the_share_of_the_way_of_the_most_open_joint() -> None:
 def test_the_program_says_where_and_ends_at_ctrl_c(dataset: artsim.Dataset) -> None:
     command = [sys.executable, "-m", "artsim", "view", str(dataset.folder), "--serve"]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+    run = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a job in the background ignores Ctrl-C
+    )
     assert run.stdout is not None
     told = re.search(r"http://127\.0\.0\.1:(\d+)/", run.stdout.readline())
     assert told is not None

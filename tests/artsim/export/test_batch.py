@@ -87,7 +87,7 @@ def test_options_that_make_no_sense_are_refused(more: dict[str, object], problem
 
 def test_a_folder_that_cannot_be_written_to_is_named(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("a file")
-    with pytest.raises(ConfigError, match="cannot write"):
+    with pytest.raises(ConfigError, match="it is a file, where a folder"):
         generate_objects(["laptop"], tmp_path / "out", 1, progress=False)
 
 
