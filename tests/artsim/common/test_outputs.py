@@ -45,9 +45,9 @@ def test_an_input_is_not_overwritten_by_its_page(laptop: Path, tmp_path: Path) -
     link.symlink_to(laptop / "mobility.urdf")
     for path in (laptop, laptop / "mobility.urdf"):
         for out in (laptop / "mobility.urdf", laptop / ".." / "laptop" / "mobility.urdf", link):
-            with pytest.raises(ConfigError, match="it is an input|it is no .* file"):
+            with pytest.raises(ConfigError, match=r"it is an input|it is no .* file"):
                 View(path, html=out).run()
-            with pytest.raises(ConfigError, match="it is an input|it is no .* file"):
+            with pytest.raises(ConfigError, match=r"it is an input|it is no .* file"):
                 View(path, out=out).run()
     assert _bytes(laptop) == before
     View(laptop, html=laptop / "page.html").run()
@@ -95,9 +95,9 @@ def test_what_was_read_is_an_input_by_any_path(tmp_path: Path, monkeypatch: pyte
     check_output(Path("a"))
     read_bounded(tmp_path / "a", 10, "file")
     for path in (Path("a"), tmp_path / "a", Path("./a")):
-        with pytest.raises(ConfigError, match="it is an input|it is no .* file"):
+        with pytest.raises(ConfigError, match=r"it is an input|it is no .* file"):
             write_output(path, b"2")
-    with pytest.raises(ConfigError, match="it is an input|it is no .* file"):
+    with pytest.raises(ConfigError, match=r"it is an input|it is no .* file"):
         check_output(Path("b"), [Path("./b")])
     write_output(Path("b"), b"2")
 
