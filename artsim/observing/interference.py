@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from artsim.errors import ConfigError
 from artsim.model.kinematics import Array
@@ -112,6 +111,8 @@ def _foreign_points(
     Where the object is hidden there are none, so that they do not tell how it goes on.
     """
     extent = float(np.ptp(image, axis=0).max())
+    from scipy.spatial import cKDTree  # help waits for no scipy
+
     middle, tree = sample.points.mean(axis=0, dtype=np.float64), cKDTree(image)
     some = image[:: max(1, len(image) // _PROBED)]
     beside = _BESIDE * float(np.quantile(tree.query(some, [_NEIGHBOURS + 1], workers=1)[0], 0.9))
