@@ -119,6 +119,10 @@ def test_an_unknown_measure_and_an_unknown_revision_are_refused() -> None:
         assert "no revision 'nowhere'" in run("compare", "nowhere", code=2)[1]
 
 
+def test_a_family_without_real_objects_is_refused() -> None:
+    assert "there is no real 'dragon'" in run("held_out", "--categories", "dragon", code=2)[1]
+
+
 def test_errors_are_told_by_points_and_true_labels_are_used() -> None:
     options = ("--categories", "drawer", "--objects", 3, "--views", 1)
     own, told = figures("errors", *options)["drawer"], figures("errors", *options, "--true-labels")["drawer"]
