@@ -11,13 +11,13 @@ PINS = $(shell $(PYTHON) -c 'import sys; print("-c constraints.txt" * (sys.versi
 # Tests start hundreds of programs: each would compile all modules anew where this is set.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo check test lint results audit weights gpu assets system clean
+.PHONY: help demo check test lint results audit weights gpu assets site release matrix system clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*##/\1 /p' $(MAKEFILE_LIST) | while read -r name text; do printf '%-8s %s\n' "$$name" "$$text"; done
 
 demo: $(VENV)/.ready  ## draw all categories, make a dataset, train a small estimator, in out/demo
-	$(TIMED) demo $(PY) examples/demo/main.py out/demo
+	$(TIMED) demo $(VENV)/bin/artperl demo --out out/demo
 
 check: $(VENV)/.ready-dev lint  ## lint, types and the fast tests: in two minutes, before each commit
 	$(PYTEST) --dist worksteal -m "not slow"
@@ -50,6 +50,15 @@ gpu: $(VENV)/.ready-dev  ## on a machine with a GPU: tests marked gpu, speed; re
 assets: $(VENV)/.ready-dev  ## make the objects in urdf_assets again
 	$(PY) urdf_assets/build.py
 
+site: $(VENV)/.ready-dev  ## build the site of the docs, which needs no network, in out/site
+	NO_MKDOCS_2_WARNING=1 $(TIMED) site $(PY) -m mkdocs build --strict
+
+release: $(VENV)/.ready-dev  ## build and check sdist and wheel in dist, and use them in an environment of their own
+	$(TIMED) release scripts/release.sh $(abspath $(PY))
+
+matrix:  ## try the wheel in dist with each Python from 3.10 to 3.13 that exists
+	scripts/matrix.sh dist/*.whl
+
 # System libraries that PyBullet's EGL renderer needs, SAPIEN's Vulkan driver and a browser for the tests of pages;
 # everything else comes from pip.
 system:  ## install what EGL, SAPIEN and the tests of pages need; wants root
@@ -66,4 +75,4 @@ $(VENV)/.ready-dev: pyproject.toml constraints.txt
 	touch $(VENV)/.ready $@
 
 clean:  ## remove the environment and everything made
-	rm -rf $(VENV) out build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

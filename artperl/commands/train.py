@@ -30,17 +30,17 @@ class Train:
     Prints the table of errors at intervals and keeps the best estimator in OUT/best. Stop it at any moment with Ctrl-C:
     rerun the command to resume, with the same result. Curves: tensorboard --logdir OUT.
 
-    To see it learn: python train.py --category laptop --preset quick
+    To see it learn: artperl train --category laptop --preset quick
 
-    To train well: python train.py --category eyeglasses --preset long --out out/eyeglasses
+    To train well: artperl train --category eyeglasses --preset long --out out/eyeglasses
 
     To make an estimator that comes with the package: artperl train --recipe laptop
 
     For your robot, from the estimator for any tree:
-    python train.py --files robot.urdf --preset joint --start-from generic --perception-steps 2000
+    artperl train --files robot.urdf --preset joint --start-from generic --perception-steps 2000
 
     On several processors or GPUs, with the same result:
-    torchrun --nproc-per-node 2 train.py --category laptop --out out/laptop
+    torchrun --nproc-per-node 2 -m artperl train --category laptop --out out/laptop
 
     Defaults are those of the preset or the recipe.
     """
@@ -106,7 +106,7 @@ class Train:
     real: bool = False
     """Learn from real objects, too: every other one, of the half of ArtImage's frozen split that is not for testing."""
     dataset: Path | None = None
-    """Learn from the train split of a dataset that generate.py wrote, instead of from fresh objects."""
+    """Learn from the train split of a dataset that artsim generate wrote, instead of from fresh objects."""
     start_from: Path | None = None
     """Folder of an estimator whose networks are trained further; by default they start at random."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] | None = None

@@ -8,6 +8,7 @@ import tyro
 
 from artperl.commands.benchmarks import Ablation, ArtImage, Robustness
 from artperl.commands.calibrate import Calibrate
+from artperl.commands.demo import Demo
 from artperl.commands.detections import MakeDetections
 from artperl.commands.estimate import Estimate
 from artperl.commands.evaluate import Evaluate
@@ -20,7 +21,8 @@ from artsim.common.program import run_program
 from artsim.common.progress import say
 
 Verb = (
-    Annotated[Train, tyro.conf.subcommand("train")]
+    Annotated[Demo, tyro.conf.subcommand("demo")]
+    | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[ArtImage, tyro.conf.subcommand("artimage")]
     | Annotated[Robustness, tyro.conf.subcommand("robustness")]

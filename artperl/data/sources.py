@@ -119,7 +119,7 @@ class Samples:
 
 
 class Recorded:
-    """Samples of a dataset by number: the train split of what ``generate.py`` wrote, in another order on each pass.
+    """Samples of a dataset by number: the train split of what ``artsim generate`` wrote, in another order on each pass.
 
     Parameters
     ----------

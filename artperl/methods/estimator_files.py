@@ -143,7 +143,7 @@ def _load_stored(
         category = str(name) if folder_of(name).parent == WEIGHTS else "laptop"
         raise DatasetError(
             f"there is no estimator of the method {kind.name}", name,
-            f"train it: python train.py --category {category} --method {kind.name} --preset long",
+            f"train it: artperl train --category {category} --method {kind.name} --preset long",
         )  # fmt: skip
     settings = read_settings(folder)
     _check_method(settings, kind.name, folder)
@@ -307,8 +307,8 @@ def estimator_fix(name: str) -> str:
     shipped = sorted(path.parent.name for path in WEIGHTS.glob(f"*/{SETTINGS}"))
     for of in shipped:
         if name in read_settings(WEIGHTS / of)["about"].get("options", {}).get("categories", ()):
-            return f"use {of}, which covers {name} and comes with the package, or a folder that train.py wrote"
-    return f"{name_fix(name, shipped)}, which come with the package, or a folder that train.py wrote"
+            return f"use {of}, which covers {name} and comes with the package, or a folder that artperl train wrote"
+    return f"{name_fix(name, shipped)}, which come with the package, or a folder that artperl train wrote"
 
 
 _RENAMED = {"doubt": "expected_error", "foreign": "outlier_share"}

@@ -177,7 +177,7 @@ def _warp() -> tuple[str, float | None]:
 def _ray() -> tuple[str, float | None]:
     import ray
 
-    return f"Ray {ray.__version__}, for generate.py --ray", None
+    return f"Ray {ray.__version__}, for artsim generate --ray", None
 
 
 def _torch() -> tuple[str, float | None]:

@@ -25,9 +25,9 @@ class Generate(Opened, Workers):
     rerun the command to resume; damaged files are regenerated. With a larger --num-samples it extends
     the dataset. The result depends on the options and the seed alone, never on the number of workers.
 
-    To make objects: python generate.py --categories laptop drawer --objects-per-category 200 --out out/first
+    To make objects: artsim generate --categories laptop drawer --objects-per-category 200 --out out/first
 
-    To load objects: python generate.py --objects path/to/partnet_mobility/Laptop --out out/real --num-samples 500
+    To load objects: artsim generate --objects path/to/partnet_mobility/Laptop --out out/real --num-samples 500
     """
 
     out: Annotated[str, tyro.conf.arg(metavar="FOLDER|URL")]

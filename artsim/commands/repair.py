@@ -64,7 +64,7 @@ class Repair(Packages, Workers):
 
 @dataclass(frozen=True)
 class Merge:
-    """Complete a dataset that several machines made with generate.py --share.
+    """Complete a dataset that several machines made with artsim generate --share.
 
     Nothing is complete before: shards that are missing are named, with the shares to run again.
 

@@ -43,7 +43,7 @@ class Dataset:
     Parameters
     ----------
     folder : path or str
-        Folder that ``generate.py`` wrote, or URL for fsspec, such as ``s3://bucket/first``.
+        Folder that ``artsim generate`` wrote, or URL for fsspec, such as ``s3://bucket/first``.
     split : str, optional
         "train", "val" or "test"; all samples by default.
 
@@ -210,7 +210,7 @@ class SampleStream(DrawnStream):
 
 
 def open_dataset(folder: str | Path, split: str | None = None) -> Dataset:
-    """Open a dataset that ``generate.py`` wrote, in a folder or at a URL; see :class:`Dataset`."""
+    """Open a dataset that ``artsim generate`` wrote, in a folder or at a URL; see :class:`Dataset`."""
     return Dataset(folder, split)
 
 

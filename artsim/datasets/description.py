@@ -113,7 +113,7 @@ def read_description(place: Place) -> tuple[Plan, list[ShardRecord], dict[str, A
             storage.place,
             f"run the same generate command again, or {repair_command(storage.place)}: it resumes"
             if begun
-            else "name a folder that generate.py wrote",
+            else "name a folder that artsim generate wrote",
         )
     document = _document(storage, DESCRIPTION)
     plan = _plan(document, storage, DESCRIPTION)

@@ -57,7 +57,7 @@ def repair(folder: str | Path, sources: Sequence[Source] = (), workers: int = 2,
     folder = Path(folder)
     storage, begun = FolderStorage(folder), read_started(folder)
     if begun is None:
-        raise DatasetError("no dataset here", folder, "name a folder that generate.py wrote")
+        raise DatasetError("no dataset here", folder, "name a folder that artsim generate wrote")
     inventory = examine(folder, begun, workers, progress)
     foreign = strangers(folder, begun)
     if not inventory and begun.complete and not begun.problems and not leftover_problems(folder):

@@ -127,7 +127,7 @@ def test_the_deployed_policy_is_the_learnt_one(base: ShapeBase) -> None:
 
 def test_the_method_without_shipped_weights_says_how_to_train_it() -> None:
     with pytest.raises(
-        DatasetError, match=r"train it: python train.py --category stapler --method artperl --preset long"
+        DatasetError, match=r"train it: artperl train --category stapler --method artperl --preset long"
     ):
         load_estimator("stapler", method="artperl")
 

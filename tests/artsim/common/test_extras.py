@@ -64,6 +64,7 @@ VERBS: dict[str, dict[str, list[tuple[str, str]]]] = {
         "doctor": [("warp", "")],
     },
     "artperl": {
+        "demo": [("--out demo", "view,train"), ("--help", "")],
         "train": [("--out run", "train")],
         "evaluate": [("laptop", "train")],
         "artimage": [("", "train")],
