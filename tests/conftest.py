@@ -7,11 +7,12 @@ import importlib
 import multiprocessing
 import operator
 import os
+import shutil
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from types import ModuleType
-from typing import NoReturn, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 import pytest
@@ -189,3 +190,17 @@ def box_laptop(tmp_path: Path) -> Path:
     path = tmp_path / "box_laptop.urdf"
     path.write_text(BOX_LAPTOP)
     return path
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Chromium, which draws with its own software."""
+    path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if path is None:
+        absent("no Chromium: pages are not opened (scripts/install-browser.sh installs it)")
+    with installed("playwright.sync_api").sync_playwright() as playwright:
+        arguments = ["--no-sandbox", "--disable-background-networking", "--use-angle=swiftshader"]
+        arguments += ["--enable-unsafe-swiftshader"]
+        chromium = playwright.chromium.launch(executable_path=path, args=arguments)
+        yield chromium
+        chromium.close()

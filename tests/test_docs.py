@@ -11,7 +11,7 @@ import pytest
 from tests.conftest import installed
 
 ROOT = Path(__file__).parents[1]
-PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md")), *sorted(ROOT.glob("examples/*/README.md"))]
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md")), *sorted(ROOT.glob("examples/*/README.md"))]
 TELL_THE_PAST = ("CHANGELOG.md", "experiments.md")
 """Pages about what was done; all others describe what is."""
 LONGEST_MEAN = 18.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,21 +13,6 @@ import artsim
 from artsim.families import make
 from artsim.model.camera import Camera
 from artsim.observing.sample import Sample
-from tests.conftest import absent, installed
-
-
-@pytest.fixture(scope="package")
-def browser() -> Iterator[Any]:
-    """Chromium, which draws with its own software."""
-    path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if path is None:
-        absent("no Chromium: pages are not opened (scripts/install-browser.sh installs it)")
-    with installed("playwright.sync_api").sync_playwright() as playwright:
-        arguments = ["--no-sandbox", "--disable-background-networking", "--use-angle=swiftshader"]
-        arguments += ["--enable-unsafe-swiftshader"]
-        chromium = playwright.chromium.launch(executable_path=path, args=arguments)
-        yield chromium
-        chromium.close()
 
 
 @pytest.fixture
