@@ -48,6 +48,7 @@ def on_config(config: Any) -> Any:
     for section in config.nav:
         for name, pages in section.items():
             pages += more.get(name, [])
+    config.theme.static_templates.discard("404.html")  # its paths start at a server's root, its search in the network
     return config
 
 
