@@ -11,11 +11,12 @@ mkdir -p "$work/source"
 git archive HEAD | tar x -C "$work/source"
 # An index shows README alone: links of the repository lead nowhere there.
 "$python" scripts/site.py README.md >"$work/source/README.md"
-"$python" -m build --outdir dist "$work/source" >"$work/build.log" || { tail -n 20 "$work/build.log" && exit 1; }
+"$python" -m build --outdir dist "$work/source" >"$work/build.log" 2>&1 || { tail -n 20 "$work/build.log" && exit 1; }
 "$python" -m twine check --strict dist/*
 check=$(dirname "$("$python" -c 'import sys; print(sys.executable)')")
 "$check/check-wheel-contents" dist/*.whl
-"$check/pyroma" --min=10 dist/*.tar.gz
+# The authors have no common address.
+"$check/pyroma" --min=10 --skip-tests AuthorEmail dist/*.tar.gz
 ls -l dist
 scripts/matrix.sh dist/*.whl "$python"
 (cd build/matrix/3.*/ && venv/bin/artperl demo)
