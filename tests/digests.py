@@ -6,7 +6,7 @@ import hashlib
 import json
 from pathlib import Path
 
-from artperl.methods.estimator_files import WEIGHTS
+from artperl.methods.estimator_folders import WEIGHTS
 
 REPRODUCED = Path(__file__).parent / "reproduced.json"
 

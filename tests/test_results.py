@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from artperl.methods.estimator_files import WEIGHTS
+from artperl.methods.estimator_folders import WEIGHTS
 from artsim.families import make
 from tests.conftest import ROOT
 from tests.digests import weights_digest

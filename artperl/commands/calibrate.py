@@ -43,7 +43,8 @@ class Calibrate:
         )
         from artperl.evaluation.scoring import evaluate, evaluate_foreign
         from artperl.evaluation.tables import summary, table
-        from artperl.methods.estimator_files import WEIGHTS, folder_of, load_estimator, read_settings
+        from artperl.methods.estimator_files import load_estimator
+        from artperl.methods.estimator_folders import WEIGHTS, folder_of, read_settings
         from artperl.methods.estimator_writing import save_estimator
         from artsim.families import FAMILIES
 

@@ -66,12 +66,13 @@ class Estimate(EstimateOptions):
     """
 
     def run(self) -> None:
-        from artperl.methods.estimator_files import load_estimator
-
         inputs = (*self.clouds, self.intrinsics, self.mask, self.detections)
         for path in (self.out, self.view, self.picture):
             if path not in (None, STDOUT):
                 check_output(path, inputs)
+        for path in inputs:  # before torch is imported, which takes seconds
+            if path is not None and not (path.exists() or path.is_symlink()):
+                raise ConfigError("there is no such file or folder", path, "check its name")
         if self.detections is not None or self.detector is not None or is_image_pair(self.clouds):
             estimate_scene(self)
             return
@@ -83,7 +84,10 @@ class Estimate(EstimateOptions):
         several = len(self.clouds) != 1 or self.clouds[0].is_dir() or self.clouds[0].suffix == ".tar"
         self._check(several)
         told: dict[str, Any] = {} if self.seen_from is None else {"seen_from": self.seen_from}
-        load = partial(load_estimator, estimator_folder(self.category).absolute(), method=self.method, **told)
+        folder = estimator_folder(self.category).absolute()
+        from artperl.methods.estimator_files import load_estimator
+
+        load = partial(load_estimator, folder, method=self.method, **told)
         if several:
             self._estimate_all(load)
         else:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from artperl.methods.estimator_folders import estimator_fix, folder_of
 from artsim.errors import ConfigError
 
 
@@ -14,8 +15,6 @@ def estimator_folder(name: str) -> Path:
     ConfigError
         When there is none.
     """
-    from artperl.methods.estimator_files import estimator_fix, folder_of
-
     settings = "estimator.json"
     for folder in (folder_of(name), Path(name) / "best"):
         if (folder / settings).is_file():

@@ -10,7 +10,8 @@ from artperl.evaluation.artimage_files import ArtImageFiles
 from artperl.evaluation.samples import NUM_POINTS
 from artperl.evaluation.scoring import evaluate, object_symmetries
 from artperl.evaluation.tables import against_published, summary, table
-from artperl.methods.estimator_files import folder_of, load_estimator
+from artperl.methods.estimator_files import load_estimator
+from artperl.methods.estimator_folders import folder_of
 from artperl.methods.full import Estimator
 from artsim.common.progress import track
 from artsim.errors import DatasetError

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 Unit = Literal["m", "mm", "cm"]
 METRES: dict[str, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+_WHOLE = 0.5
+"""Share of an image with depth from which it shows more than an object that was cut out."""
 _OPENGL = np.array([1.0, -1.0, -1.0])
 """From a camera that looks along -z, y up, to one that looks along z, y down."""
 
@@ -193,6 +195,11 @@ def _of_depth(path: Path, intrinsics: Path, options: InputOptions) -> Cloud:
         depth = -depth
     elif not (depth > 0).any() and (depth < 0).any():
         raise ConfigError("all depth is negative, as along the z axis of OpenGL", path, "add --camera opengl")
+    if shown is None and float((depth > 0).mean()) > _WHOLE:
+        warnings.append(
+            "without a mask, the whole image is taken for one object. Fix: add --mask mask.png, or name the image in"
+            " colour first, so that objects are found: artperl estimate image.png depth.png --intrinsics camera.json"
+        )
     points = points_of_depth(depth, camera.K, shown, options.depth_kind)
     return Cloud(points, (*notes, said), tuple(warnings))
 

@@ -21,25 +21,29 @@ from artperl.core.tensor_files import MAX_BYTES, read_tensors
 from artperl.core.threads import single_precision
 from artperl.fitting.options import EstimatorOptions
 from artperl.methods import STORED_METHODS, method_of
-from artperl.methods.estimator_writing import BASE, FORMAT, SETTINGS, TENSORS
+from artperl.methods.estimator_folders import (
+    AGAIN,
+    BASE,
+    SETTINGS,
+    TENSORS,
+    WEIGHTS,
+    folder_of,
+    read_settings,
+)  # fmt: skip
 from artperl.methods.full import Estimator
 from artperl.methods.protocol import Stored, Untrained
 from artperl.perception.network import Perception
 from artperl.retrieval.box_embedding import EMBEDDED
 from artperl.retrieval.shape_base_file import read_shape_base
-from artsim.common.files import read_bounded, read_json
+from artsim.common.files import read_bounded
 from artsim.common.json_records import from_json_values
-from artsim.common.names import name_fix, printable
+from artsim.common.names import printable
 from artsim.errors import ConfigError, DatasetError
 from artsim.model.objects import MAX_PARTS
 
 if TYPE_CHECKING:
     from artperl.methods.artperl import ArtPERL
 
-WEIGHTS = Path(__file__).parents[1] / "weights"
-"""Folder of the estimators that come with the package."""
-
-_AGAIN = "train it again"
 _GONE = {"occluded_parts"}
 """Options that files of former versions may name: they are passed over."""
 
@@ -112,11 +116,11 @@ def load_estimator(
         calibration = from_json_values(Calibration, settings.get("calibration"))
         part_calibration = from_json_values(PartCalibration, settings.get("part_calibration"))
     except ValueError as error:
-        raise DatasetError(f"{SETTINGS} is damaged: {error}", folder, _AGAIN) from error
-    tensors, _ = read_tensors(folder / TENSORS, "the file of weights", _AGAIN)
+        raise DatasetError(f"{SETTINGS} is damaged: {error}", folder, AGAIN) from error
+    tensors, _ = read_tensors(folder / TENSORS, "the file of weights", AGAIN)
     for key, shape in sizes.largest.items():  # a forged width takes no memory before it is that of the weights
         if key not in tensors or tensors[key].shape != shape:
-            raise DatasetError(f"the estimator does not load: {key} is not of shape {shape}", folder, _AGAIN)
+            raise DatasetError(f"the estimator does not load: {key} is not of shape {shape}", folder, AGAIN)
     networks = sizes.networks()
     _check_fit(networks, tensors, folder)
     for key, network in networks.items():
@@ -124,7 +128,7 @@ def load_estimator(
         network.to(device)
     base = read_shape_base(folder / BASE)
     if base.embeddings is not None and base.embeddings.shape[1] != EMBEDDED * base.shapes.trees.num_rows:
-        raise DatasetError("its embeddings are not of its objects", folder / BASE, _AGAIN)
+        raise DatasetError("its embeddings are not of its objects", folder / BASE, AGAIN)
     perception, boxes, first = networks["perception"], networks.get("boxes"), networks.get("first_look")
     assert isinstance(perception, Perception)
     assert isinstance(boxes, Boxes | None)
@@ -147,14 +151,14 @@ def _load_stored(
         )  # fmt: skip
     settings = read_settings(folder)
     _check_method(settings, kind.name, folder)
-    base, (tensors, _) = read_shape_base(folder / BASE), read_tensors(folder / TENSORS, "the file of weights", _AGAIN)
+    base, (tensors, _) = read_shape_base(folder / BASE), read_tensors(folder / TENSORS, "the file of weights", AGAIN)
     try:
         with torch.device("meta"):  # a forged size takes no memory before it is that of the weights
             networks = kind.of_settings(settings, base).networks()
         _check_fit(networks, tensors, folder)
         method = kind.of_settings(settings, base)
     except ValueError as error:
-        raise DatasetError(f"{SETTINGS} is damaged: {error}", folder, _AGAIN) from error
+        raise DatasetError(f"{SETTINGS} is damaged: {error}", folder, AGAIN) from error
     for key, network in method.networks().items():
         network.load_state_dict(_under(tensors, f"{key}."))
     return method.to(device)
@@ -185,7 +189,7 @@ def stored_method(name: str | Path) -> str:
     folder = folder_of(name)
     found = read_settings(folder).get("method", "full")
     if found not in STORED_METHODS:
-        raise DatasetError(f"this is an estimator of an unknown method, {found!r:.40}", folder, _AGAIN)
+        raise DatasetError(f"this is an estimator of an unknown method, {found!r:.40}", folder, AGAIN)
     return str(found)
 
 
@@ -265,55 +269,7 @@ def _check_fit(networks: Mapping[str, nn.Module], tensors: Mapping[str, Tensor],
             elif not bool(torch.isfinite(tensor).all()):
                 problem = f"{name} is not finite"
     if problem is not None:
-        raise DatasetError(f"the estimator does not load: {problem}", folder, _AGAIN)
-
-
-def folder_of(name: str | Path, method: str = "full") -> Path:
-    """Folder of an estimator. One that comes with the package is not hidden by a folder of that name without any."""
-    own, shipped = Path(name), WEIGHTS / ("" if method == "full" else method) / _FORMER_ESTIMATORS.get(str(name), name)
-    return shipped if shipped.is_dir() and not (own / SETTINGS).is_file() else own
-
-
-_FORMER_ESTIMATORS = {"any": "generic"}
-"""Names that shipped estimators had."""
-
-
-def read_settings(folder: Path) -> dict[str, Any]:
-    """Settings of the estimator in a folder.
-
-    Raises
-    ------
-    DatasetError
-        When there is none, or it was written by another version.
-    """
-    if not (folder / SETTINGS).exists():
-        raise DatasetError("there is no estimator", folder, estimator_fix(folder.name))
-    # An option, or a figure of its training, may be infinite.
-    settings = read_json(folder / SETTINGS, SETTINGS, DatasetError, _MAX_SETTINGS_BYTES, finite=False)
-    if not isinstance(settings, dict) or not isinstance(settings.get("about"), dict):
-        raise DatasetError(f"{SETTINGS} is damaged: it says nothing about an estimator", folder, _AGAIN)
-    if settings.get("format") != FORMAT:
-        raise DatasetError(f"format {settings.get('format')!r:.20} is not {FORMAT}", folder, _AGAIN)
-    own = settings.get("options")
-    for values in (settings, own if isinstance(own, dict) else {}):  # methods have them among their options
-        for name in ("calibration", "part_calibration"):
-            if isinstance(values.get(name), dict):
-                values[name] = {_RENAMED.get(key, key): value for key, value in values[name].items()}
-    return settings
-
-
-def estimator_fix(name: str) -> str:
-    """What to do where there is no estimator of a name."""
-    shipped = sorted(path.parent.name for path in WEIGHTS.glob(f"*/{SETTINGS}"))
-    for of in shipped:
-        if name in read_settings(WEIGHTS / of)["about"].get("options", {}).get("categories", ()):
-            return f"use {of}, which covers {name} and comes with the package, or a folder that artperl train wrote"
-    return f"{name_fix(name, shipped)}, which come with the package, or a folder that artperl train wrote"
-
-
-_RENAMED = {"doubt": "expected_error", "foreign": "outlier_share"}
-"""Names that files of former versions have for symptoms."""
-_MAX_SETTINGS_BYTES = 16_000_000
+        raise DatasetError(f"the estimator does not load: {problem}", folder, AGAIN)
 
 
 def weights_sha256(folder: Path) -> str:

@@ -6,13 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from artperl.core.tensor_files import write_tensors
+from artperl.methods.estimator_folders import BASE, FORMAT, SETTINGS, TENSORS
 from artperl.methods.protocol import Storable
 from artperl.retrieval.shape_base_file import write_shape_base
 from artsim.common.files import write_atomic
-
-FORMAT = 4
-SETTINGS, TENSORS, BASE = "estimator.json", "weights.safetensors", "base.npz"
-"""Files of the folder."""
 
 
 def save_estimator(estimator: Storable, folder: Path, about: Mapping[str, Any]) -> None:

@@ -15,7 +15,8 @@ from artperl.core.estimate import Estimate
 from artperl.detection import SHIPPED
 from artperl.inputs.depth_images import points_of_depth
 from artperl.inputs.detections import Detection
-from artperl.methods.estimator_files import WEIGHTS, load_estimator, stored_method
+from artperl.methods.estimator_files import load_estimator, stored_method
+from artperl.methods.estimator_folders import WEIGHTS
 from artperl.methods.protocol import Method
 from artperl.scene.denoise import denoise
 from artsim.errors import ArtsimError, ConfigError

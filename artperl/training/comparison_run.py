@@ -19,7 +19,8 @@ from artperl.evaluation.robotarm import ARM, arm_samples, seven_part_arm
 from artperl.evaluation.samples import NUM_POINTS
 from artperl.evaluation.scoring import evaluate, object_symmetries
 from artperl.methods import StoredMethod
-from artperl.methods.estimator_files import WEIGHTS, folder_of, load_estimator
+from artperl.methods.estimator_files import load_estimator
+from artperl.methods.estimator_folders import WEIGHTS, folder_of
 from artperl.methods.protocol import Method
 from artperl.training.options import LENGTHS, PRESETS, TrainOptions, preset_of
 from artperl.training.recipes import about_tested

@@ -9,7 +9,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from artperl.methods.estimator_files import WEIGHTS, folder_of, read_settings, weights_sha256
+from artperl.methods.estimator_files import weights_sha256
+from artperl.methods.estimator_folders import WEIGHTS, folder_of, read_settings
 from artperl.training.options import FORMER_PRESETS, TrainOptions, changed, preset_of
 from artsim.common.files import parse_json, read_bounded
 from artsim.errors import ConfigError, DatasetError

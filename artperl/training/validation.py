@@ -18,7 +18,7 @@ from artperl.evaluation.samples import (
 from artperl.evaluation.scoring import Scored, evaluate, evaluate_foreign, headline
 from artperl.evaluation.tables import summary, table
 from artperl.methods.artperl import ArtPERL
-from artperl.methods.estimator_files import read_settings
+from artperl.methods.estimator_folders import read_settings
 from artperl.methods.estimator_writing import save_estimator
 from artperl.methods.full import Estimator
 from artperl.methods.protocol import Method

@@ -12,7 +12,8 @@ from artperl.evaluation import metrics
 from artperl.evaluation.artimage import real_objects
 from artperl.evaluation.samples import frozen_samples, samples_of
 from artperl.evaluation.scoring import evaluate
-from artperl.methods.estimator_files import WEIGHTS, folder_of, load_estimator, read_settings
+from artperl.methods.estimator_files import load_estimator
+from artperl.methods.estimator_folders import WEIGHTS, folder_of, read_settings
 from artsim.datasets.plan import SampleOptions
 from artsim.model.draws import StateOptions, ViewOptions
 from artsim.observing.interference import FOREIGN, interfere

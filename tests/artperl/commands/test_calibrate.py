@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from artperl.commands.calibrate import Calibrate
-from artperl.methods.estimator_files import load_estimator, read_settings
+from artperl.methods.estimator_files import load_estimator
+from artperl.methods.estimator_folders import read_settings
 from artsim.errors import ConfigError
 
 

@@ -210,6 +210,9 @@ def test_help_lists_every_format(program: Program) -> None:
     ],
 )  # fmt: skip
 def test_options_that_do_not_fit_are_one_line(words: list[str], said: str, program: Program) -> None:
+    for name in words:
+        if Path(name).suffix in (".npy", ".png", ".las"):
+            Path(name).touch()
     _, err = program(*words)
     assert program.code == 2
     assert said in err
@@ -284,3 +287,29 @@ def test_no_result_takes_the_place_of_an_input(program: Program, tmp_path: Path)
         assert program.code == 2
         assert "it is an input" in err
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize(
+    ("words", "fix"),
+    [
+        ("missing.ply", "check its name"),
+        (f"{CASES / 'E00' / 'c.npy'} --category Laptop", "did you mean laptop"),
+        (f"{CASES / 'E00' / 'c.npy'} --category storage_furniture", "use generic, which covers storage_furniture"),
+    ],
+)
+def test_names_are_checked_before_torch_is_imported(words: str, fix: str) -> None:
+    code = f"""import sys
+from artperl.commands import verbs
+sys.argv = ["artperl", "estimate", *{words.split()!r}]
+try:
+    verbs.main()
+except SystemExit as stop:
+    assert stop.code == 2 and "torch" not in sys.modules"""
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert fix in run.stderr
+
+
+def test_a_whole_image_gets_advice(program: Program) -> None:
+    folder = CASES / "S01"
+    _, told = program(folder / "depth.png", "--intrinsics", folder / "cam.json")
+    assert "Fix: add --mask mask.png" in told

@@ -11,7 +11,7 @@ import pytest
 
 from artperl.commands import verbs
 from artperl.data.categories import ARTIMAGE
-from artperl.methods.estimator_files import WEIGHTS, read_settings
+from artperl.methods.estimator_folders import WEIGHTS, read_settings
 from artperl.training.options import PRESETS, TrainOptions, changed
 from artperl.training.recipes import RECIPES, Recipe, is_made, provenance
 from artsim.errors import ConfigError

@@ -18,7 +18,8 @@ from artperl.boxes.network import Boxes
 from artperl.commands import verbs
 from artperl.data.sources import Given
 from artperl.evaluation.samples import TEST_SEEDS, VALIDATION_SEEDS
-from artperl.methods.estimator_files import load_estimator, read_settings
+from artperl.methods.estimator_files import load_estimator
+from artperl.methods.estimator_folders import read_settings
 from artperl.methods.estimator_writing import save_estimator
 from artperl.training.context import Report
 from artperl.training.objects import BASE_SEEDS

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from artperl.methods import StoredMethod
-from artperl.methods.estimator_files import read_settings
+from artperl.methods.estimator_folders import read_settings
 from artperl.training.options import TrainOptions
 from artperl.training.run import Training
 from artperl.training.validation import goes_on
