@@ -99,7 +99,7 @@ def stated_camera(content: Any, hints: Hints, path: Path) -> Stated:
         stated = replace(stated, format="OpenCV's kind, which artsim does not write", center=_THEIRS)
     K, size, notes = _windowed(stated, said.size, found.around[0] if found.around else {}, hints)
     return replace(
-        stated, K=K, size=size, depth_scale=said.depth_scale, distortion=said.distortion,
+        stated, K=K, size=size, depth_scale=said.depth_scale, distortion=said.distortion or stated.distortion,
         notes=(*stated.notes, *notes, *said.notes), warnings=said.warnings,
     )  # fmt: skip
 
@@ -122,7 +122,7 @@ def _find(content: Any, hints: Hints, path: Path, deeper: int) -> _Found | None:
     if not isinstance(content, Mapping):
         return None
     data = {str(name): value for name, value in content.items()}
-    scene = _bop_scene(data, hints, path)
+    scene = _bop_scene(data, hints, path) or _azure(data, hints)
     if scene is not None:
         return scene
     stated = _stated(data, hints)
@@ -210,6 +210,36 @@ def _bop_scene(data: Mapping[str, Any], hints: Hints, path: Path) -> _Found | No
     return None if found is None else _Found(
         replace(found, notes=(f"the camera of image {number}",)), (data[numbers[number]],)
     )  # fmt: skip
+
+
+def _azure(data: Mapping[str, Any], hints: Hints) -> _Found | None:
+    """The calibration that an Azure Kinect keeps: of its whole sensors, over whose sides numbers are divided.
+
+    Images show parts of the sensors, binned, which the size of the image tells.
+    """
+    inner = data.get("CalibrationInformation")
+    if not isinstance(inner, Mapping) or not isinstance(inner.get("Cameras"), list) or hints.size is None:
+        return None
+    width, height = hints.size
+    depth = hints.size in _AZURE_DEPTH
+    location = "CALIBRATION_CameraLocation" + ("D0" if depth else "PV0")
+    camera = next((c for c in inner["Cameras"][:8] if isinstance(c, Mapping) and c.get("Location") == location), None)
+    if camera is None:
+        return None
+    # Colour is cut at the top and the bottom, from 4:3.
+    sides, left, top = _AZURE_DEPTH.get(hints.size, ((width, 0.75 * width), 0.0, 0.5 * (0.75 * width - height)))
+    cx, cy, fx, fy, *distortion = map(_number, camera["Intrinsics"]["ModelParameters"][:14])
+    K = _of_four(fx * sides[0], fy * sides[1], cx * sides[0] - left, cy * sides[1] - top)
+    which = f"the {'depth' if depth else 'colour'} camera, by the size of the image"
+    name = "an Azure Kinect's calibration"
+    return _Found(Stated(K, name, _OURS, hints.size, None, tuple(distortion), (which,)), ())
+
+
+_AZURE_DEPTH = {
+    (640, 576): ((1024.0, 1024.0), 192.0, 180.0), (320, 288): ((512.0, 512.0), 96.0, 90.0),
+    (1024, 1024): ((1024.0, 1024.0), 0.0, 0.0), (512, 512): ((512.0, 512.0), 0.0, 0.0),
+}  # fmt: skip
+"""Of each size of a depth image: sides of the sensor, binned, and the left upper corner of the image on it, pixels."""
 
 
 def _stated(data: Mapping[str, Any], hints: Hints, only: str = "") -> Stated | None:

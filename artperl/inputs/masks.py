@@ -8,15 +8,23 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from artperl.inputs.bounds import read_npy, read_npz
+from artperl.inputs.bounds import guard, read_file, read_npy, read_npz
+from artperl.inputs.coco_masks import decode_segmentation
 from artperl.inputs.images import Picture, read_picture
+from artsim.common.files import parse_json
 from artsim.errors import ConfigError
 
 MaskKind = Literal["auto", "binary", "parts"]
 """binary: the object is what is not 0; parts: artsim's own part masks, where 255 is what shows no part and 0 is the
 root; auto: parts where the mask looks like one, binary otherwise."""
 
-MASK_FILES = (".png", ".bmp", ".gif", ".tif", ".tiff", ".pgm", ".pbm", ".ppm", ".jpg", ".jpeg", ".webp", ".npy", ".npz")
+MASK_FILES = (
+    ".png", ".bmp", ".gif", ".tif", ".tiff", ".pgm", ".pbm", ".ppm", ".jpg", ".jpeg", ".webp", ".npy", ".npz", ".json",
+)  # fmt: skip
+_MAX_JSON_BYTES = 64_000_000
+"""All masks of one image take one or two."""
+_MOST_SIDE = 16_384
+"""Pixels."""
 _FIX = "give a PNG that is black where the object is not, or .npy of (H, W)"
 _NONE = 255
 """What artsim writes where no part, or no instance, is seen."""
@@ -52,7 +60,8 @@ def read_mask(path: Path, mask_id: str | None = None, kind: MaskKind = "auto") -
     Parameters
     ----------
     path : Path
-        A picture, ``.npy``, or ``.npz`` with an array 'mask', or only one that fits.
+        A picture, ``.npy``, or ``.npz`` with an array 'mask', or only one that fits; or ``.json`` of run lengths, as
+        Segment Anything writes it.
     mask_id : str, optional
         Which object, where several are in the mask: the number that its pixels have (with a palette: their index); the
         colour, as "#ff8000" or "255,128,0"; of a stack of masks (N, H, W), the number of one.
@@ -66,6 +75,8 @@ def read_mask(path: Path, mask_id: str | None = None, kind: MaskKind = "auto") -
     ending = path.suffix.lower()
     if ending in (".npy", ".npz"):
         return _of_array(_read_array(path), path, mask_id, kind)
+    if ending == ".json":
+        return _of_run_lengths(path, mask_id)
     picture = read_picture(path, "mask")
     if picture.mode == "CMYK":
         raise ConfigError("a mask in CMYK is not read", path, _FIX)
@@ -83,6 +94,27 @@ def _read_array(path: Path) -> NDArray[Any]:
         return read_npy(path, "mask", _FIX)
     choice = read_npz(path, "mask", _FIX, lambda shape, dtype: len(shape) in (2, 3, 4) and dtype.kind in "bfiu")
     return choice.one_of(("mask", "masks", "segmentation", "part_mask"))[1]
+
+
+def _of_run_lengths(path: Path, mask_id: str | None) -> Mask:
+    """A mask of Segment Anything: an entry with a ``segmentation``, as COCO has it, a list of such, or annotations."""
+    content: Any = guard(lambda: parse_json(read_file(path, "mask", _MAX_JSON_BYTES)), path, "mask", _FIX)
+    if isinstance(content, dict):
+        content = content.get("annotations", [content])
+    entries = content if isinstance(content, list) else []
+    if len(entries) != 1 and (mask_id is None or not mask_id.isdigit() or int(mask_id) >= len(entries)):
+        fix = f"choose one: --mask-id 0 to {len(entries) - 1}" if entries else _FIX
+        raise ConfigError(f"it holds {len(entries)} masks", path, fix)
+    entry = entries[int(mask_id or 0) if len(entries) > 1 else 0]
+
+    def decoded() -> Mask:
+        runs = entry.get("segmentation", entry)
+        height, width = runs["size"]
+        if not (type(height) is type(width) is int and 0 < height <= _MOST_SIDE and 0 < width <= _MOST_SIDE):
+            raise ValueError(f"a mask of {width!r:.20} x {height!r:.20} pixels is not read")
+        return Mask(decode_segmentation(runs, width, height))
+
+    return guard(decoded, path, "mask", _FIX)
 
 
 def _of_array(values: NDArray[Any], path: Path, mask_id: str | None, kind: MaskKind) -> Mask:

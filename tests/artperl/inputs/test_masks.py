@@ -197,3 +197,28 @@ def test_a_picture_of_too_many_pixels_is_not_decoded(tmp_path: Path) -> None:
     for read in (read_depth, read_mask):
         with pytest.raises(ConfigError, match="12000 x 12000 pixels is over the limit"):
             read(tmp_path / "bomb.png")
+
+
+def test_masks_of_segment_anything_are_read(tmp_path: Path) -> None:
+    from pycocotools import mask as coco
+
+    rng, width, height = np.random.default_rng(0), 40, 30
+    shown = rng.random((2, height, width)) < 0.3
+    entries = [
+        {"segmentation": coco.encode(np.asfortranarray(m.astype(np.uint8))), "bbox": [0, 0, 1, 1]} for m in shown
+    ]
+    for entry in entries:
+        entry["segmentation"]["counts"] = entry["segmentation"]["counts"].decode()
+    file = tmp_path / "sam.json"
+    for content in (entries, {"image": {"width": width, "height": height}, "annotations": entries}):
+        file.write_text(json.dumps(content))
+        for number in range(2):
+            np.testing.assert_array_equal(read_mask(file, str(number)).shown, shown[number])
+        with pytest.raises(ConfigError, match="--mask-id 0 to 1"):
+            read_mask(file)
+    file.write_text(json.dumps(entries[1]["segmentation"]))
+    np.testing.assert_array_equal(read_mask(file).shown, shown[1])
+    for damaged in ([], [3], {"size": [10**9, 10**9], "counts": [10**18]}, {"size": [2, 2], "counts": [9]}):
+        file.write_text(json.dumps(damaged))
+        with pytest.raises(ConfigError, match="Fix"):
+            read_mask(file)
