@@ -1,6 +1,6 @@
 """The verb ``artperl evaluate``, and what all tests of estimators share."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -61,7 +61,8 @@ class Evaluate:
         from artperl.evaluation.scoring import evaluate, object_symmetries
         from artperl.evaluation.tables import summary, table
         from artperl.methods import STORED_METHODS
-        from artperl.methods.estimator_files import folder_of, load_estimator, read_settings
+        from artperl.methods.estimator_files import load_estimator
+        from artperl.methods.estimator_folders import folder_of, read_settings
         from artsim.loading.sources import find_sources
 
         if self.json is not None:
@@ -78,6 +79,7 @@ class Evaluate:
         if self.files:
             sources = find_sources(self.files, self.package_root)
             objects = [match_category(source.load(), categories, parts) for source in sources]
+            objects = [replace(obj, category=obj.object_id) if obj.category == "unknown" else obj for obj in objects]
             samples = samples_of(objects, self.views, options)
         elif not categories:
             raise ConfigError("it knows objects of files, no category", "evaluate", "name them with --files")

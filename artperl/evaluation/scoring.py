@@ -56,6 +56,8 @@ class Scored:
     part_right: NDArray[np.bool_]
     """(E,) bool. Whether each estimated part has a true part of its own near it."""
     part_symptoms: PartSymptoms
+    part_names: tuple[str, ...] = ()
+    """Of the sample."""
     symmetric_errors: dict[str, Array] | None = None
     """dict of (K,) float, or None. Errors against the nearest of the truths that look the same; None where the object
     has no symmetry."""
@@ -141,6 +143,7 @@ def compare(estimate: Estimate, sample: Sample, milliseconds: float, symmetric: 
     nearest = min([errors, *others], key=lambda found: float(found["rotation_deg"].mean())) if others else None
     return Scored(
         category=sample.category,
+        part_names=sample.part_names,
         errors=errors,
         symmetric_errors=nearest,
         parts_found=found_share(part_right, sample),
@@ -230,6 +233,7 @@ def _mismatch(sample: Sample, estimate: Estimate, milliseconds: float, symmetric
 def _failure(sample: Sample, milliseconds: float) -> Scored:
     return Scored(
         category=sample.category,
+        part_names=sample.part_names,
         errors={name: metric.failed_values(sample) for name, metric in METRICS.items()},
         parts_found=0.0,
         segmentation=0.0,

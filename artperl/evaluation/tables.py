@@ -11,6 +11,7 @@ from artperl.evaluation.part_detection import part_figures, part_line
 from artperl.evaluation.published import ARTIMAGE_PUBLISHED
 from artperl.evaluation.reliability import confidence_figures, confidence_line
 from artperl.evaluation.scoring import Scored
+from artsim.common.names import printable
 
 Array = NDArray[np.float64]
 
@@ -25,17 +26,19 @@ def summary(scored: Sequence[Scored]) -> dict[str, Any]:
     -------
     dict
         ``{category: {"parts": [{metric: {"median": x, "mean": x}}], "failures": n, "instances": n,
-        "ms_per_instance": median, ...}}``, without the metrics that do not apply; and ``"up_to_symmetry"`` for
-        categories with objects that look the same turned round.
+        "ms_per_instance": median, ...}}``, without the metrics that do not apply; ``"part_names"`` where all objects
+        have the same; and ``"up_to_symmetry"`` for categories with objects that look the same turned round.
     """
     return {category: _category_summary(scored, category) for category in dict.fromkeys(s.category for s in scored)}
 
 
 def _category_summary(scored: Sequence[Scored], category: str) -> dict[str, Any]:
     own = [s for s in scored if s.category == category]
+    names = {s.part_names for s in own}
     right, confidence = np.array([s.right for s in own]), np.array([s.confidence for s in own])
     return {
         "parts": [_part_summary(own, k) for k in range(max(len(s.rotation) for s in own))],
+        **({"part_names": list(names.pop())} if len(names) == 1 else {}),
         "instances": len(own),
         "failures": sum(s.failed for s in own),
         "right": float(right.mean()),
@@ -83,24 +86,29 @@ def table(figures: dict[str, Any]) -> str:
         As :func:`summary` gives them.
     """
     columns = {name: metric for name, metric in METRICS.items() if metric.title}
+    labels = {
+        category: [f"{category} {name}" for name in figure.get("part_names") or range(len(figure["parts"]))]
+        for category, figure in figures.items()
+    }
+    width = max([_NAME, *(len(label) + 1 for own in labels.values() for label in own)])
     lines = [
-        " " * _NAME + "".join(f"{metric.title:>{_MEDIAN + _MEAN}s}" for metric in columns.values()),
-        " " * _NAME + f"{'median':>{_MEDIAN}s}{'mean':>{_MEAN}s}" * len(columns),
+        " " * width + "".join(f"{metric.title:>{_MEDIAN + _MEAN}s}" for metric in columns.values()),
+        " " * width + f"{'median':>{_MEDIAN}s}{'mean':>{_MEAN}s}" * len(columns),
     ]
     for category, figure in figures.items():
         for k, part in enumerate(figure["parts"]):
-            lines.append(f"{f'{category} {k}':{_NAME}s}" + "".join(_cell(part, name) for name in columns))
+            lines.append(f"{printable(labels[category][k]):{width}s}" + "".join(_cell(part, name) for name in columns))
         lines.append(
-            f"{'':{_NAME}s}{figure['instances']} instances, {figure['failures']} failures, "
+            f"{'':{width}s}{figure['instances']} instances, {figure['failures']} failures, "
             f"{100 * figure['right']:.0f} % right, {100 * figure['parts_found']:.0f} % of parts found, "
             f"{100 * figure['segmentation']:.1f} % of points right, "
             f"{figure['ms_per_instance']:.0f} ms"
         )
         if "up_to_symmetry" in figure:
-            lines.append(" " * _NAME + _symmetric_line(figure["up_to_symmetry"]))
-        lines.append(" " * _NAME + _confidence_line(figure))
+            lines.append(" " * width + _symmetric_line(figure["up_to_symmetry"]))
+        lines.append(" " * width + _confidence_line(figure))
         if figure["detection"]["precision"] is not None:
-            lines.append(" " * _NAME + part_line(figure["detection"]))
+            lines.append(" " * width + part_line(figure["detection"]))
     return "\n".join(lines)
 
 

@@ -97,7 +97,7 @@ def test_a_method_is_evaluated_on_such_a_folder(tmp_path: Path, capsys: pytest.C
     json_path = tmp_path / "figures.json"
     verbs.ArtImage(root=tmp_path, json=json_path).run()
     printed = capsys.readouterr().out
-    assert "laptop 1" in printed
+    assert "laptop part_1" in printed
     assert "eyeglasses: left out" in printed
     figures = json.loads(json_path.read_text())["original"]["laptop"]
     assert figures["instances"] == 2
