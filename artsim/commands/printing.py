@@ -13,8 +13,7 @@ def resumable(kept: str, place: object) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        print(f"\nstopped; {kept} in {place}: rerun the command to resume")
-        raise
+        raise KeyboardInterrupt(f"{kept} in {place}: rerun the command to resume") from None
 
 
 def print_made(place: object, whole: str, made: int, unit: str, seconds: float) -> None:

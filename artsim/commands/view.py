@@ -38,6 +38,11 @@ class View(Opened):
     """Port of --serve; 0 takes a free one."""
 
     def run(self) -> None:
+        if not self.path.exists():
+            raise ConfigError(
+                "there is no dataset and no object", self.path,
+                "name the folder of a dataset (artsim generate makes one), or an object's file or folder",
+            )  # fmt: skip
         for path, kind in ((self.out, ".png"), (self.html, ".html"), (self.rerun, ".rrd")):
             if path is not None and path.suffix.lower() != kind:
                 raise ConfigError(f"it is no {kind} file", path, f"name it {path.stem or 'page'}{kind}")

@@ -7,10 +7,9 @@ Functions that call one another belong in one file: numba's cache notices change
 called, not of others.
 """
 
-import contextlib
+import functools
 import sys
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
 from typing_extensions import ParamSpec
@@ -22,30 +21,23 @@ _MATHS = {"contract", "reassoc", "nsz"}
 """Liberties that do not touch infinities and NaN: sums in any order, and fused products, so that loops use wide
 registers."""
 
-_SAID_AFTER = 1.5
-"""Seconds after which it is said that something is compiled. What is kept on the disk loads in a tenth of that."""
 
+@functools.cache
+def _say_compiling() -> None:
+    """Have standard error told, once in a process, that loops are compiled; none are where the disk has them."""
+    from numba.core import event
 
-@contextlib.contextmanager
-def said_if_slow() -> Iterator[None]:
-    """Say on standard error, once in a process, that loops are being compiled, where that takes a while."""
-    said = threading.Timer(_SAID_AFTER, _say)
-    said.daemon = True
-    said.start()
-    try:
-        yield
-    finally:
-        said.cancel()
+    class Said(event.Listener):
+        said = False
 
+        def on_start(self, event: Any) -> None:
+            if not self.said:
+                print("artsim compiles its loops for this processor: some seconds, once", file=sys.stderr)
+            self.said = True
 
-def _say() -> None:
-    if not _Said.already:
-        _Said.already = True
-        print("artsim compiles its loops for this processor: some seconds, once", file=sys.stderr)
+        def on_end(self, event: Any) -> None: ...
 
-
-class _Said:
-    already = False
+    event.register("numba:compile", Said())
 
 
 class Compiled(Generic[P, R]):
@@ -76,14 +68,15 @@ class Compiled(Generic[P, R]):
             result: R = self._dispatcher(*args, **kwargs)
             return result
         self._called = True
-        with said_if_slow():
-            result = self._prepare()(*args, **kwargs)
+        result = self._prepare()(*args, **kwargs)
         return result
 
     def _prepare(self) -> Any:
         """Numba's own function, which others of the module then call by the same name."""
         if self._dispatcher is None:
             import numba
+
+            _say_compiling()
 
             how: dict[str, Any] = {"nogil": True, "fastmath": not self._exact and _MATHS, "error_model": "numpy"}
             try:

@@ -6,7 +6,7 @@ import io
 import os
 import sys
 from importlib.metadata import version
-from typing import Any
+from typing import Any, get_args
 
 import tyro
 
@@ -30,6 +30,8 @@ def run_program(verb: Any, program: str, description: str | None = None) -> None
     if sys.argv[1:] == ["--version"]:
         print(f"{program} {version('artsim')}")
         return
+    if not sys.argv[1:] and get_args(verb):  # of several verbs, none is the default
+        sys.argv.append("--help")
     if isinstance(sys.stdout, io.TextIOWrapper):  # a terminal need not know every character
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
@@ -46,5 +48,6 @@ def run_program(verb: Any, program: str, description: str | None = None) -> None
     except (ArtsimError, OSError) as error:
         print(f"error: {printable(error, 4000)}", file=sys.stderr)
         sys.exit(2)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:  # its text says what is kept
+        print("; ".join(["\nstopped", *map(str, stop.args)]), file=sys.stderr)
         sys.exit(130)

@@ -4,6 +4,7 @@ What does it stands in rooms above, whose modules register it.
 """
 
 import html
+import sys
 from collections.abc import Sequence
 from functools import singledispatch
 from importlib import import_module
@@ -95,7 +96,8 @@ class Showable:
             return Path(out)
         with tempfile.NamedTemporaryFile(prefix="artsim-", suffix=".html", delete=False) as file:
             file.write(page)
-        webbrowser.open(Path(file.name).as_uri())
+        if not webbrowser.open(Path(file.name).as_uri()):
+            print(f"no browser is found: open {file.name}", file=sys.stderr)
         return Path(file.name)
 
     def _repr_html_(self) -> str:

@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
+from artsim.common.progress import say
 from artsim.datasets.description import DESCRIPTION, PLAN, StartedDataset, document_bytes, read_started
 from artsim.datasets.inventory import (
     UNFINISHED,
@@ -39,6 +40,7 @@ from artsim.datasets.preparing import VERSIONS_OF, Preparation, Share
 from artsim.datasets.restore import Restoration
 from artsim.datasets.sample_options import SampleOptions
 from artsim.datasets.splits import check_shares
+from artsim.datasets.summary import expected_line
 from artsim.datasets.worker import PARTS, PARTS_OF_ONE
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.loading.sources import Source
@@ -169,6 +171,8 @@ def generate(
                 shards = begun.plan.shards()
                 own = shards if begun.complete else shards[machine.number :: machine.count]
                 inventory = examine_sizes(storage, begun, own, PARTS)
+            if progress and inventory.shards:
+                say(expected_line(begun.plan))
             parts = PARTS_OF_ONE if alone else PARTS
             restored = Restoration(storage, begun, inventory, sources, team, progress, parts, share is None)
             restored.run()

@@ -16,6 +16,21 @@ _KINDS_SHOWN = 12
 _NAMES_SHOWN = 8
 
 
+_SAMPLE_BYTES, _POINT_BYTES = 7000, 25
+"""Of a sample in a shard: its records, and each point."""
+_PIXEL_BYTES = {"depth": 4.0, "part_mask": 0.03, "rgb": 1.0}
+"""Of each image: depth is not compressed, the others are PNG."""
+
+
+def expected_line(plan: Plan) -> str:
+    """How many samples of how many objects a dataset is to have in each split, and what disk they take."""
+    options, views = plan.sample, plan.sample.views
+    pixels = views.width * views.height * sum(_PIXEL_BYTES[image] for image in options.images)
+    size = plan.num_samples * (_SAMPLE_BYTES + _POINT_BYTES * options.num_points + pixels)
+    splits = ", ".join(f"{name} {plan.sizes[name]} of {len(plan.objects_of[name])}" for name in SPLITS)
+    return f"{plan.num_samples} samples of {len(plan.objects)} objects ({splits}): about {size / 1e6:.2g} MB of disk"
+
+
 def summary(
     place: str, plan: Plan, shards: Sequence[ShardRecord], description: Mapping[str, Any], split: str | None
 ) -> str:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
-import time
+from pathlib import Path
 
 import pytest
 
-from artsim.common import compiled as module
-from artsim.common.compiled import compiled, said_if_slow
+from artsim.common.compiled import compiled
+from tests.conftest import ROOT
 
 
 @compiled
@@ -41,13 +42,18 @@ def test_numba_comes_with_the_first_call_alone() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_what_takes_long_is_said_once(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_SAID_AFTER", 0.01)
-    monkeypatch.setattr(module._Said, "already", False)
-    with said_if_slow():
-        pass
-    assert capsys.readouterr().err == ""
+@pytest.mark.slow
+def test_it_is_said_once_that_loops_are_compiled_and_not_when_they_are_read(tmp_path: Path) -> None:
+    (tmp_path / "loops.py").write_text(
+        "from artsim.common.compiled import compiled\n"
+        "@compiled\ndef twice(n):\n    return 2 * n\n"
+        "@compiled\ndef thrice(n):\n    return 3 * n\n"
+    )
+    code, said = "import loops; assert loops.twice(2) + loops.thrice(1) == 7", []
     for _ in range(2):
-        with said_if_slow():
-            time.sleep(0.2)
-    assert capsys.readouterr().err.count("compiles its loops") == 1
+        run = subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True,
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": f"{ROOT}:{tmp_path}"},
+        )  # fmt: skip
+        said.append(run.stderr.count("compiles its loops"))
+    assert said == [1, 0]

@@ -152,9 +152,9 @@ def test_ctrl_c_stops_quietly_and_says_how_to_go_on(shards: int, sources: list[S
     )  # fmt: skip
     wait_for_shards(out, shards)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to every process of the group
-    printed, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "rerun the command to resume" in printed
+    assert "rerun the command to resume" in errors
     assert "Traceback" not in errors
     assert not list(out.glob("**/.*.part"))
     if shards:
