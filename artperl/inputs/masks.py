@@ -298,6 +298,20 @@ def _differ(values: NDArray[np.uint8]) -> int:
     return int((values.max(axis=2) - values.min(axis=2)).max())
 
 
+def cut_warnings(shown: NDArray[np.bool_]) -> tuple[str, ...]:
+    """What to say of an object that is cut by the border of its image; nothing where it is not.
+
+    Parameters
+    ----------
+    shown : (H, W) bool
+        Where it is.
+    """
+    return (_CUT,) if _on_border(shown) > 0.0 else ()
+
+
+_CUT = "its mask reaches the border of the image: what lies beyond is guessed, and sizes may be too small"
+
+
 def _on_border(chosen: NDArray[np.bool_]) -> float:
     """Share of the pixels along the border."""
     border = np.concatenate([chosen[0], chosen[-1], chosen[:, 0], chosen[:, -1]])

@@ -13,7 +13,7 @@ from artperl.inputs.clouds import READERS, read_cloud_file
 from artperl.inputs.depth_images import ARRAYS, PICTURES, DepthImage, DepthKind, points_of_depth, read_depth
 from artperl.inputs.intrinsics import Intrinsics, PixelCenter, check_camera, read_camera
 from artperl.inputs.intrinsics_formats import Hints
-from artperl.inputs.masks import MASK_FILES, MaskKind, read_mask
+from artperl.inputs.masks import MASK_FILES, MaskKind, cut_warnings, read_mask
 from artsim.errors import ConfigError
 from artsim.model.camera import Camera
 
@@ -200,6 +200,8 @@ def _of_depth(path: Path, intrinsics: Path, options: InputOptions) -> Cloud:
             "without a mask, the whole image is taken for one object. Fix: add --mask mask.png, or name the image in"
             " colour first, so that objects are found: artperl estimate image.png depth.png --intrinsics camera.json"
         )
+    if shown is not None:
+        warnings.extend(cut_warnings(shown))
     points = points_of_depth(depth, camera.K, shown, options.depth_kind)
     return Cloud(points, (*notes, said), tuple(warnings))
 

@@ -15,7 +15,13 @@ from artsim.model.camera import Camera
 
 _OVER = 2  # drawn larger, then reduced: smooth lines
 _NEAREST = 1e-3  # metres before the camera: what comes nearer is not drawn
+_SURE = 0.5
+"""Confidence from which an estimate is drawn: it is the probability of being right, so that most of the others are
+wrong."""
 _AXIS = (235, 25, 45)
+_LUMA = (0.299, 0.587, 0.114)
+_BRIGHT = 140
+"""Luma of BT.601 from which black is easier to read on a colour than white."""
 _REACH = 0.18
 """Half of an axis, over the diagonal of all sizes."""
 _SIGNS = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)]) - 0.5
@@ -45,7 +51,7 @@ def scene_gallery(pictures: Sequence[bytes], columns: int = 3, width: int = 480)
 
 
 def draw_scene(rgb: NDArray[np.uint8], K: NDArray[np.float64], scene: SceneEstimate) -> bytes:
-    """PNG of an image with the estimates over it.
+    """PNG of an image with its objects; boxes of parts and axes are drawn of what is more likely right than wrong.
 
     Parameters
     ----------
@@ -58,11 +64,12 @@ def draw_scene(rgb: NDArray[np.uint8], K: NDArray[np.float64], scene: SceneEstim
     canvas = Image.fromarray(rgb).resize((width * _OVER, height * _OVER), Image.Resampling.BILINEAR)
     draw = ImageDraw.Draw(canvas)
     for number, obj in enumerate(scene.objects):
-        if obj.estimate is not None:
+        if obj.estimate is not None and obj.estimate.confidence >= _SURE:
             _draw_boxes(draw, obj.estimate, camera, number)
             _draw_axes(draw, obj.estimate, camera)
     for number, obj in enumerate(scene.objects):  # on top of all lines
-        sure = "no estimate" if obj.estimate is None else f"{100 * obj.score:.0f} %"
+        unsure = "" if obj.estimate is None or obj.estimate.confidence >= _SURE else ", not drawn"
+        sure = "no estimate" if obj.estimate is None else f"{100 * obj.score:.0f} %{unsure}"
         _label(draw, obj.detection.box, f"{number} {printable(obj.detection.category, 40)} {sure}", number, height)
     buffer = io.BytesIO()
     canvas.resize((width, height), Image.Resampling.BOX).save(buffer, "PNG")
@@ -111,4 +118,5 @@ def _label(
     size = 5 * _OVER + height // 50
     place = (left + 4, max(top - size - 6, 2))
     draw.rectangle(draw.textbbox(place, text, font_size=size), fill=colour)
-    draw.text(place, text, fill=(255, 255, 255), font_size=size)
+    bright = float(np.dot(colour, _LUMA)) > _BRIGHT
+    draw.text(place, text, fill=(0, 0, 0) if bright else (255, 255, 255), font_size=size)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from artperl.core.estimate import Estimate
 from artperl.detection import SHIPPED
 from artperl.inputs.depth_images import points_of_depth
 from artperl.inputs.detections import Detection
+from artperl.inputs.masks import cut_warnings
 from artperl.methods.estimator_files import load_estimator, stored_method
 from artperl.methods.estimator_folders import WEIGHTS
 from artperl.methods.protocol import Method
@@ -159,7 +160,9 @@ class SceneEstimator:
             estimate = estimator(points)
         except ArtsimError as error:
             return SceneObject(detection, None, str(error))
-        return SceneObject(detection, estimate, "", 1e3 * (time.perf_counter() - begun))
+        milliseconds = 1e3 * (time.perf_counter() - begun)
+        estimate = replace(estimate, warnings=(*estimate.warnings, *cut_warnings(mask)))
+        return SceneObject(detection, estimate, "", milliseconds)
 
     def _estimator(self, category: str) -> Method:
         if category not in self._loaded:

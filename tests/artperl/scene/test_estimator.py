@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,15 @@ def test_one_object_is_posed_and_the_others_say_why_they_are_not() -> None:
     assert 500 < changed.sum() < 0.5 * changed.size
     near = (columns > left - 60) & (columns < left + width + 60) & (rows > top - 60) & (rows < top + height + 60)
     assert near.mean() > 0.9
+    unsure = replace(first, estimate=replace(first.estimate, confidence=0.1))
+    outline = np.asarray(open_image(draw_scene(rgb, CAMERA.K, SceneEstimate((unsure,)))))
+    assert (outline != 90).any(axis=2).sum() < 0.8 * changed.sum()
+    assert not any("border" in text for text in first.estimate.warnings)
+    half = int(left + 0.6 * width)  # the image ends within the laptop
+    cut = Detection(0, "laptop", 0.8, mask_record(mask[:, :half])["segmentation"], tuple(told["bbox"]), (half, 240))
+    (seen,) = load_scene_estimator()(None, frame.depth[:, :half], CAMERA.K, [cut]).objects
+    assert seen.estimate is not None
+    assert "border" in seen.estimate.warnings[-1]
 
 
 def test_a_gallery_has_every_picture_in_its_place() -> None:
