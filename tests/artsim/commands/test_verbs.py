@@ -38,6 +38,31 @@ def test_help_teaches() -> None:
         assert verb in result.stdout
 
 
+@pytest.mark.parametrize("program", [ARTSIM, "artperl"])
+def test_without_words_a_list_of_commands_fits_a_screen(program: str) -> None:
+    bare = run(program)
+    assert bare.returncode == 0
+    assert bare.stdout == run(program, "--help").stdout
+    assert len(bare.stdout.splitlines()) <= 50
+    assert "Exit codes: 0" in bare.stdout
+    assert run(program, "--completion", "fishing").returncode == 2
+
+
+def test_bash_completes_commands_options_and_choices(tmp_path: Path) -> None:
+    """By bash itself, as the key Tab has it call the function."""
+    (tmp_path / "artsim").write_text(run(ARTSIM, "--completion", "bash").stdout)
+    script = """source artsim
+        tab() { COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)); _tyro_artsim; printf '%s\n' "${COMPREPLY[@]}"; }
+        tab artsim ge; echo; tab artsim view --s; echo; tab artsim families --pack; echo; tab artsim convert --to h"""
+    result = subprocess.run(["bash", "-c", script], cwd=tmp_path, capture_output=True, text=True, check=True)
+    found = [block.split("\n") for block in result.stdout.strip().split("\n\n")]
+    assert [sorted(words) for words in found[:2]] == [
+        ["generate", "generate-objects"],
+        ["--samples", "--serve", "--split"],
+    ]
+    assert sorted(found[-1]) == ["hdf5", "huggingface"]
+
+
 def test_a_mistyped_option_is_pointed_out() -> None:
     result = run(GENERATE, "--objects", LAPTOP, "--out", "x", "--num-sample", "3")
     assert result.returncode == 2
