@@ -209,7 +209,10 @@ def test_help_lists_every_format(program: Program) -> None:
         (["c.npy", "d.npy", "--out", "p.json"], ".jsonl"), ([], "name clouds"),
     ],
 )  # fmt: skip
-def test_options_that_do_not_fit_are_one_line(words: list[str], said: str, program: Program) -> None:
+def test_options_that_do_not_fit_are_one_line(
+    words: list[str], said: str, program: Program, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     for name in words:
         if Path(name).suffix in (".npy", ".png", ".las"):
             Path(name).touch()
