@@ -181,7 +181,7 @@ if __name__ == "__main__":
         if kind == "python":
             exec(block, names)
             continue
-        for line in block.splitlines():
+        for line in block.replace("\\\\\\n", "").splitlines():
             words = shlex.split(line, comments=True)
             sys.argv = words[words[0] == "python" :]
             programs[sys.argv[0]]()

@@ -49,12 +49,13 @@ class Estimate(EstimateOptions):
     floats metres: see --unit and --depth-scale. 0, NaN and 65535 are no measurement. Depth is taken along the camera's
     axis: see --depth-kind.
 
-    Masks: .png .bmp .gif .tif .pgm .jpg .webp in any mode, .npy, .npz. The object is what is neither black nor
-    transparent; of a JPEG, or a soft mask, what is over half; of artsim's own part_mask.png what is not 255.
+    Masks: .png .bmp .gif .tif .pgm .jpg .webp in any mode, .npy, .npz, .json of Segment Anything. The object is what is
+    neither black nor transparent; of a JPEG, or a soft mask, what is over half; of artsim's own part_mask.png what is
+    not 255.
 
-    Intrinsics: .json of artsim (fx, fy, cx, cy, or K), BOP (camera.json, scene_camera.json), Open3D, RealSense, ROS
-    CameraInfo, NeRF (transforms.json); .yaml of ROS and OpenCV; a 3 x 3 matrix as .txt, .npy or .npz. The centre of the
-    first pixel is at 0.5 in artsim's and NeRF's files, and at 0 in all others: see --pixel-center.
+    Intrinsics: .json of artsim (fx, fy, cx, cy, or K), BOP (camera.json, scene_camera.json), Open3D, RealSense, Azure
+    Kinect, ROS CameraInfo, NeRF (transforms.json); .yaml of ROS and OpenCV; a 3 x 3 matrix as .txt, .npy or .npz. The
+    centre of the first pixel is at 0.5 in artsim's and NeRF's files, and at 0 in all others: see --pixel-center.
 
     Detections: COCO's results, a list of image_id, category (or category_id beside categories), score, segmentation
     (run lengths or polygons) or bbox (left, top, width, height). The file may hold those of other images, too:
