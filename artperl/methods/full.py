@@ -5,7 +5,7 @@ In the order of the paper: perception and retrieval (4.2), the fit on Theta (4.1
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -33,6 +33,7 @@ from artperl.fitting.search import find_fit
 from artperl.methods.estimator_writing import changed_values, save_estimator
 from artperl.methods.many import estimate_many
 from artperl.methods.tracking import track
+from artperl.methods.views import estimate_frames, estimate_views
 from artperl.perception.cloud_checks import cloud_warnings, with_size
 from artperl.perception.label_smoothing import smooth_perceived
 from artperl.perception.network import Perceived, Perception, Votes
@@ -167,6 +168,14 @@ class Estimator:
     def track(self, clouds: Iterable[ArrayLike]) -> Iterator[Estimate]:
         """Estimates of the clouds of one moving object, each from the last: :func:`artperl.methods.tracking.track`."""
         return track(self.with_fit, clouds)
+
+    def views(self, clouds: Sequence[ArrayLike], T_world_camera: ArrayLike) -> Estimate:
+        """The estimate of an object that stands still, from several sides: :mod:`artperl.methods.views`."""
+        return estimate_views(self, clouds, T_world_camera)
+
+    def frames(self, clouds: Sequence[ArrayLike]) -> list[Estimate]:
+        """Estimates of one object whose joints have moved between clouds: :mod:`artperl.methods.views`."""
+        return estimate_frames(self, clouds)
 
     def many(self, clouds: Iterable[ArrayLike], workers: int = 1) -> Iterator[Estimate | ArtsimError]:
         """Estimates of many clouds, in several processes: :func:`artperl.methods.many.estimate_many`."""
