@@ -46,6 +46,7 @@ from artperl.perception.network import Perceived, Votes
 from artsim.checks.realism import read_split, real_objects
 from artsim.common.progress import track
 from artsim.errors import ArtsimError, ConfigError
+from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 
 Told = Literal["nothing", "level", "box", "joint", "votes"]
@@ -142,16 +143,19 @@ def _sense(estimate: Estimate, m: int, sample: Sample, k: int) -> float:
     return 1.0 if estimate.joint_axis[m] @ sample.joint_axis_camera[k] >= 0 else -1.0
 
 
+def real(category: str) -> list[ArticulatedObject]:
+    """The real objects of a category's dev half."""
+    folder = os.environ.get("ARTSIM_PARTNET_DIR")
+    if folder is None:
+        raise ConfigError("no folder of real objects is named", "partnet", "set ARTSIM_PARTNET_DIR")
+    split = read_split(Path(__file__).parent / "splits" / "partnet_dev.json")
+    return list(real_objects(category, Path(folder), split, "dev"))
+
+
 def tested(category: str, options: Options) -> tuple[list[Sample], dict[str, LooksSame]]:
     """Views of a category's objects, and how they look the same."""
-    folder = os.environ.get("ARTSIM_PARTNET_DIR")
-    if options.procedural:
-        objects = objects_of([category], options.procedural, TEST_SEEDS, "any")
-    elif folder is None:
-        raise ConfigError("no folder of real objects is named", "partnet", "set ARTSIM_PARTNET_DIR")
-    else:
-        split = read_split(Path(__file__).parent / "splits" / "partnet_dev.json")
-        objects = list(real_objects(category, Path(folder), split, "dev"))
+    made = options.procedural
+    objects = objects_of([category], made, TEST_SEEDS, "any") if made else real(category)
     return samples_of(objects, options.views), object_symmetries(objects)
 
 

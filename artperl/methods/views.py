@@ -111,12 +111,7 @@ def estimate_views(
     ArtsimError
         When no cloud shows an object.
     """
-    poses = np.asarray(T_world_camera, np.float64)
-    if not len(clouds) or poses.shape != (len(clouds), 4, 4) or not _is_rigid(poses):
-        raise ConfigError(
-            f"an array of shape {poses.shape} is no list of camera poses of {len(clouds)} clouds", "T_world_camera",
-            "give a rigid 4 x 4 matrix for each cloud, in their order",
-        )  # fmt: skip
+    poses = _poses(T_world_camera, len(clouds))
     points = [_measured(cloud) for cloud in clouds]
     found, failures = list[tuple[Estimate, Array, Array]](), list[ArtsimError]()
 
@@ -132,12 +127,11 @@ def estimate_views(
         raise failures[0]
     if len(clouds) > 1:  # as the surest camera sees it, so that the order of clouds does not matter
         pose = max(found, key=lambda each: _sureness(each[0]))[2]
-        look(np.concatenate([_carried(own, T, pose) for own, T in zip(points, poses, strict=True)]), pose)
+        look(_merged(points, poses, pose), pose)
     best, cloud, pose = max(found, key=lambda each: _sureness(each[0]))
-    merged = np.concatenate([_carried(own, T, pose) for own, T in zip(points, poses, strict=True)])
     told = tuple(dict.fromkeys(text for each, _, _ in found for text in each.warnings))
     moved = _moved(best, invert_transform(poses[0]) @ pose)
-    return replace(moved, part=_labels(merged, cloud, best.part), warnings=told)
+    return replace(moved, part=_labels(_merged(points, poses, pose), cloud, best.part), warnings=told)
 
 
 def estimate_frames(estimate: Callable[[ArrayLike], Estimate], clouds: Sequence[ArrayLike]) -> list[Estimate]:
@@ -290,13 +284,33 @@ def _from_root(estimate: Estimate) -> Array:
 
 def _sureness(estimate: Estimate) -> float:
     """By the parts: the whole is right as seldom as its worst part."""
-    return float(estimate.part_confidence.mean())
+    return float(estimate.part_confidence.mean()) if len(estimate.part_confidence) else estimate.confidence
 
 
-def _is_rigid(T: Array) -> bool:
-    upright = np.allclose(T[:, 3], [0.0, 0.0, 0.0, 1.0]) and bool(np.isfinite(T).all())
+def _poses(T_world_camera: ArrayLike, count: int) -> Array:
+    """(count, 4, 4) float, checked."""
+    fix = "give a rigid 4 x 4 matrix for each cloud, in their order"
+    try:
+        T = np.asarray(T_world_camera, np.float64)
+    except (TypeError, ValueError) as error:
+        raise ConfigError(f"these are no camera poses ({error})", "T_world_camera", fix) from error
+    if not count or T.shape != (count, 4, 4):
+        raise ConfigError(f"an array of shape {T.shape} has no poses of {count} clouds", "T_world_camera", fix)
     R = T[:, :3, :3]
-    return upright and np.allclose(R @ R.mT, np.eye(3), atol=1e-3) and bool((np.linalg.det(R) > 0.0).all())
+    rigid = np.isfinite(T).all() and np.allclose(R @ R.swapaxes(1, 2), np.eye(3), atol=1e-3)
+    if not rigid or (np.linalg.det(R) < 0.0).any() or not np.allclose(T[:, 3], [0.0, 0.0, 0.0, 1.0]):
+        raise ConfigError("a camera pose is not rigid", "T_world_camera", fix)
+    return T
+
+
+def merge_clouds(clouds: Sequence[ArrayLike], T_world_camera: ArrayLike) -> Array:
+    """(N, 3) points of several clouds in the frame of the first camera; not finite where nothing was measured."""
+    poses = _poses(T_world_camera, len(clouds))
+    return _merged([_measured(cloud) for cloud in clouds], poses, poses[0])
+
+
+def _merged(clouds: Sequence[Array], poses: Array, pose: Array) -> Array:
+    return np.concatenate([_carried(cloud, T, pose) for cloud, T in zip(clouds, poses, strict=True)])
 
 
 def _measured(cloud: ArrayLike) -> Array:
