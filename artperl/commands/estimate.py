@@ -9,7 +9,6 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import tee
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from artperl.commands.estimate_many import with_warnings
@@ -17,6 +16,7 @@ from artperl.commands.estimate_options import STDOUT, EstimateOptions
 from artperl.commands.estimate_scene import estimate_scene, is_image_pair
 from artperl.commands.estimators import estimator_folder
 from artperl.commands.resumed_lines import line_name
+from artsim.common.files import read_json
 from artsim.common.outputs import check_output, write_output
 from artsim.common.progress import track
 from artsim.errors import ConfigError
@@ -35,6 +35,8 @@ class Estimate(EstimateOptions):
     From a depth image: artperl estimate depth.png --mask mask.png --intrinsics camera.json --category laptop
 
     All objects of an image: artperl estimate image.png depth.png --intrinsics camera.json --picture boxes.png
+
+    From several sides of an object that stands still: artperl estimate left.ply right.ply --poses poses.json
 
     From a folder, or several files, one line of JSON each: artperl estimate FOLDER --category laptop --out poses.jsonl
 
@@ -67,14 +69,15 @@ class Estimate(EstimateOptions):
     """
 
     def run(self) -> None:
-        inputs = (*self.clouds, self.intrinsics, self.mask, self.detections)
+        inputs = (*self.clouds, self.intrinsics, self.mask, self.detections, self.poses)
         for path in (self.out, self.view, self.picture):
             if path not in (None, STDOUT):
                 check_output(path, inputs)
         for path in inputs:  # before torch is imported, which takes seconds
             if path is not None and not (path.exists() or path.is_symlink()):
                 raise ConfigError("there is no such file or folder", path, "check its name")
-        if self.detections is not None or self.detector is not None or is_image_pair(self.clouds):
+        pair = self.poses is None and is_image_pair(self.clouds)
+        if self.detections is not None or self.detector is not None or pair:
             estimate_scene(self)
             return
         if self.picture is not None or self.estimators or self.skip_bad:
@@ -83,6 +86,7 @@ class Estimate(EstimateOptions):
                 "name the image in colour, then the depth image, and add --intrinsics camera.json",
             )  # fmt: skip
         several = len(self.clouds) != 1 or self.clouds[0].is_dir() or self.clouds[0].suffix == ".tar"
+        several = several and self.poses is None
         self._check(several)
         told: dict[str, Any] = {} if self.seen_from is None else {"seen_from": self.seen_from}
         folder = estimator_folder(self.category).absolute()
@@ -92,7 +96,7 @@ class Estimate(EstimateOptions):
         if several:
             self._estimate_all(load)
         else:
-            self._estimate_one(self.clouds[0], load())
+            self._estimate_one(load())
 
     def _check(self, several: bool) -> None:
         kinds = (".jsonl",) if several else (".json", ".npz")
@@ -112,29 +116,39 @@ class Estimate(EstimateOptions):
                 "an object is written of one cloud", "urdf, mjcf, usd", "give one file, or leave them out"
             )
 
-    def _estimate_one(self, file: Path, estimator: Method) -> None:
+    def _estimate_one(self, estimator: Method) -> None:
         from artperl.evaluation.estimate_page import page
         from artperl.inputs import read_cloud
+        from artperl.methods.views import estimate_views, merge_clouds
 
-        cloud = read_cloud(file, self.input_options())
-        for text in cloud.notes:
+        file, clouds = self.clouds[0], [read_cloud(file, self.input_options()) for file in self.clouds]
+        notes = [text for cloud in clouds for text in cloud.notes]
+        for text in notes:
             print(f"note: {text}", file=sys.stderr)
-        result = with_warnings(estimator(cloud.points), cloud)
+        points: Any = [cloud.points for cloud in clouds]
+        if self.poses is None:
+            points = points[0]
+            result = estimator(points)
+        else:
+            poses = read_json(self.poses, "list of camera poses", ConfigError)
+            result, points = estimate_views(estimator, points, poses), merge_clouds(points, poses)
+        for cloud in reversed(clouds):
+            result = with_warnings(result, cloud)
         folders = {"urdf": self.urdf, "mjcf": self.mjcf, "usd": self.usd}
         for folder in dict.fromkeys(folder for folder in folders.values() if folder is not None):
             formats = [kind for kind, given in folders.items() if given == folder]
             with new_folder(folder) as part:
                 result.export(part, formats, result.reference.partition(":")[0] or self.category, file.stem)
         if self.view is not None:
-            write_output(self.view, page(result, cloud.points, f"{file.name}: {self.category}").encode())
+            write_output(self.view, page(result, points, f"{file.name}: {self.category}").encode())
         for text in result.warnings:
             print(f"warning: {text}", file=sys.stderr)
         if self.out == STDOUT:
-            print(json.dumps(result.to_dict() | {"notes": cloud.notes}, indent=1))
+            print(json.dumps(result.to_dict() | {"notes": notes}, indent=1))
             return
         print(replace(result, warnings=()))
         if self.out is not None:
-            result.save(self.out, cloud.notes)
+            result.save(self.out, notes)
 
     def _estimate_all(self, load: Callable[[], Method]) -> None:
         """A line of JSON for each cloud, written as soon as it is known, so that Ctrl-C loses nothing."""

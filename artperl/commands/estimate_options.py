@@ -36,6 +36,9 @@ class EstimateOptions:
     """The same as MJCF, for MuJoCo; it may be the same folder."""
     usd: Path | None = None
     """The same as USD."""
+    poses: Path | None = None
+    """Of an object that stands still, seen from several sides: T_world_camera of each file, in their order, as .json, a
+    list of 4 x 4 matrices. All files make one estimate then, in the first camera's frame."""
     unit: Literal["m", "mm", "cm"] | None = None
     """Unit of the numbers in the file. By default m, and mm for depth images of whole numbers."""
     camera: Literal["opencv", "opengl"] = "opencv"

@@ -93,6 +93,25 @@ def test_a_cloud_in_millimetres(program: Program) -> None:
     assert max(map(len, lines)) <= 120
 
 
+def test_views_from_known_places_are_one_estimate_in_the_first_frame(program: Program, tmp_path: Path) -> None:
+    cloud = np.load(CASES / "E00" / "c.npy")
+    T = np.eye(4)  # from the first camera, which is turned about its axis and moved, to the second
+    T[:3, :3] = [[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]]
+    T[:3, 3] = [0.1, -0.05, 0.2]
+    np.save(tmp_path / "a.npy", cloud)
+    np.save(tmp_path / "b.npy", cloud @ T[:3, :3].T + T[:3, 3])
+    poses = [np.eye(4).tolist(), np.linalg.inv(T).tolist()]
+    (tmp_path / "poses.json").write_text(json.dumps(poses))
+    (tmp_path / "one.json").write_text(json.dumps(poses[:1]))
+    views = (tmp_path / "a.npy", tmp_path / "b.npy", "--poses")
+    alone, both = program.record(tmp_path / "a.npy"), program.record(*views, tmp_path / "poses.json")
+    diagonal = np.linalg.norm(alone["size"][0])
+    assert translation_error(np.array(both["translation"]), np.array(alone["translation"]), diagonal).max() < 0.05
+    _, err = program(*views, tmp_path / "one.json")
+    assert program.code == 2
+    assert "poses of 2 clouds" in err
+
+
 def test_a_folder_is_a_line_for_each_file_and_goes_on(program: Program, tmp_path: Path) -> None:
     folder, out = tmp_path / "clouds", tmp_path / "poses.jsonl"
     folder.mkdir()
