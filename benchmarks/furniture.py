@@ -12,10 +12,8 @@ counts once, by the first of these that holds:
 
 ``--told`` says what an estimate would reach if perception said one thing right: *level* (which points are of the root,
 of what hangs on it ...), *box*, *joint*, or all three (*votes*). *found* is the mean share of parts that are right, of
-all that there are or are said to be. The last line is one JSON object.
-
-``artperl train --recipe benchmarks/cabinet.json --out out/cabinet`` trains an estimator of furniture and appliances
-from the front alone, which looks twice; ``--estimator out/cabinet/best`` measures it.
+all that there are or are said to be. *AUROC* and *off* are of the confidence of parts: whether it tells right ones
+from wrong ones, and its expected calibration error. The last line is one JSON object.
 """
 
 import json
@@ -39,6 +37,7 @@ from artperl.data.categories import objects_of
 from artperl.data.truth import to_batch, training_rows
 from artperl.evaluation.benchmark import find_estimator
 from artperl.evaluation.metrics import direction_error, rotation_error, translation_error, true_poses
+from artperl.evaluation.reliability import confidence_figures
 from artperl.evaluation.samples import TEST_SEEDS, samples_of
 from artperl.evaluation.scoring import LooksSame, found_share, match_parts, object_symmetries
 from artperl.methods.full import Estimator
@@ -164,6 +163,8 @@ def measure(estimator: Estimator, samples: Sequence[Sample], same: dict[str, Loo
     counts: Counter[str] = Counter()
     whole = number = 0
     found = 0.0
+    confidence: list[NDArray[np.float64]] = []
+    near: list[NDArray[np.bool_]] = []
     for sample in track(f"{samples[0].category}, told {told}", samples, unit="view", leave=False):
         asked = estimator if told == "nothing" else Oracle(**vars(estimator), sample=sample, told=told)
         try:
@@ -172,7 +173,10 @@ def measure(estimator: Estimator, samples: Sequence[Sample], same: dict[str, Loo
             estimate = None
         alike_ways = same.get(sample.object_sha256, LooksSame())
         own = causes(estimate, sample, alike_ways)
-        found += 0.0 if estimate is None else found_share(match_parts(estimate, sample, alike_ways), sample)
+        if estimate is not None:
+            near.append(match_parts(estimate, sample, alike_ways))
+            confidence.append(estimate.part_confidence)
+            found += found_share(near[-1], sample)
         counts.update(own)
         alike = estimate is not None and len(estimate.state) == len(sample.joint_type)
         number += not alike
@@ -180,15 +184,20 @@ def measure(estimator: Estimator, samples: Sequence[Sample], same: dict[str, Loo
     total = max(sum(counts.values()), 1)
     shares = {cause: round(100 * counts[cause] / total, 1) for cause in CAUSES if counts[cause]}
     views = len(samples)
-    return {"parts": total, "views": views, **shares, "found": round(100 * found / views, 1),
-            "views right": round(100 * whole / views, 1), "other number": round(100 * number / views, 1)}  # fmt: skip
+    sure = confidence_figures(np.concatenate(confidence), np.concatenate(near))
+    curve, off = sure["confidence_auroc"], round(100 * sure["calibration_error"], 1)
+    return {
+        "parts": total, "views": views, **shares, "found": round(100 * found / views, 1),
+        "views right": round(100 * whole / views, 1), "other number": round(100 * number / views, 1),
+        "AUROC": None if curve is None else round(curve, 2), "off": off,
+    }  # fmt: skip
 
 
 def main(options: Options) -> None:
     """Measure and print."""
     estimator = find_estimator(None, options.estimator)
     result: dict[str, dict[str, Any]] = defaultdict(dict)
-    columns = ("parts", *CAUSES, "found", "views right", "other number")
+    columns = ("parts", *CAUSES, "found", "views right", "other number", "AUROC", "off")
     print(f"{'%':20s}{'told':9s}" + "".join(f"{name:>13s}" for name in columns))
     for category in options.categories:
         samples, same = tested(category, options)

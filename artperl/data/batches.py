@@ -14,7 +14,6 @@ from artperl.data.degrading import degrade
 from artperl.data.sources import DataOptions, Source
 from artperl.data.stretching import stretch
 from artperl.data.truth import Truth, to_batch, training_rows
-from artperl.data.turning import turn_upright
 from artsim.datasets.sample_options import SensorName
 from artsim.model.kinematics import Array
 from artsim.observing.sample import Sample
@@ -29,8 +28,6 @@ _BLURRING = 2
 """Begins the seed of whether a view is as a sensor sees it."""
 _DEGRADING = 3
 """Begins the seed of whether a view is cut or dirty, and how."""
-_TURNING = 4
-"""Begins the seed of how a view is turned."""
 SENSORS: tuple[SensorName, ...] = ("d435", "azure", "kinect_v1", "gaussian3mm")
 """By which some training clouds are seen; all views of one object are by the same one."""
 _SPARE = 2
@@ -69,8 +66,7 @@ class _Rows(IterableDataset[dict[str, Array]]):
             for i in range(batch * self.batch_size, (batch + 1) * self.batch_size):
                 sample = self._sample(i)
                 more = {} if self.more is None else self.more(self.samples, i, sample)
-                turn = turn_upright(sample, np.random.default_rng([_TURNING, i])) if self.options.upright else None
-                yield training_rows(sample, self.num_points, self.samples.num_rows, turn) | more
+                yield training_rows(sample, self.num_points, self.samples.num_rows) | more
             batch += ranks * workers
 
     def _sample(self, i: int) -> Sample:

@@ -264,8 +264,6 @@ class DataOptions:
     :data:`artperl.data.batches.SENSORS`."""
     degraded: float = 0.0
     """Share of all training clouds that are cut, dirty or sparse; see :func:`artperl.data.degrading.degrade`."""
-    upright: bool = False
-    """Whether training clouds are turned about to the rest frame; see :func:`artperl.data.turning.turn_upright`."""
 
     def source(self, num_rows: int, num_points: int, seed: int, views_per_object: int) -> Source:
         """Samples by number.

@@ -42,17 +42,10 @@ class Truth(Batch):
         return torch.stack([own[part] for own, part in zip(rows, self.part, strict=True)])
 
 
-def training_rows(
-    sample: Sample, num_points: int, num_rows: int, T_view_camera: Array | None = None
-) -> dict[str, Array]:  # fmt: skip
-    """One sample as arrays for :class:`Clouds` and :class:`Truth`, with ``num_rows`` rows for parts.
-
-    ``T_view_camera``: rotation (3, 3) by which the cloud is turned; nothing else that is true depends on it.
-    """
+def training_rows(sample: Sample, num_points: int, num_rows: int) -> dict[str, Array]:
+    """One sample as arrays for :class:`Clouds` and :class:`Truth`, with ``num_rows`` rows for parts."""
     K = len(sample.joint_type)
     points, part = sample.points[:num_points], sample.part[:num_points].astype(np.int64)
-    if T_view_camera is not None:
-        points = points @ T_view_camera.T
     own = part != FOREIGN
     joint = joint_rows(
         sample.joint_type, sample.joint_axis, sample.joint_origin, sample.box_center, sample.diagonal

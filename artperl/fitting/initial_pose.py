@@ -9,7 +9,7 @@ from artperl.core.clouds import Clouds
 from artperl.core.pose import Theta, clamp_state, parent_pose, pose_parts, theta_from_parts
 from artperl.core.rotations import rotate
 from artperl.core.shapes import Shapes
-from artperl.perception.network import Perceived, Votes
+from artperl.perception.network import Perceived
 
 _ROUNDS = 4
 _LEAST = 8.0
@@ -35,8 +35,15 @@ def part_poses(clouds: Clouds, perceived: Perceived) -> tuple[Tensor, Tensor, Te
         Box sizes, metres.
     """
     unit = perceived.log_diagonal.exp()[:, None, None]
+    goal = perceived.canonical * unit
     trusted = trust(perceived)
-    rotation, translation = _robust_procrustes(perceived.canonical * unit, clouds.points, trusted)
+    weight = trusted
+    for _ in range(_ROUNDS):
+        rotation, translation = procrustes(goal, clouds.points, weight)
+        off = rotate(rotation[:, :, None], goal[:, None]) + translation[:, :, None] - clouds.points[:, None]
+        distance = off.square().sum(-1)
+        typical = (distance * weight).sum(2, keepdim=True) / weight.sum(2, keepdim=True).clamp(min=1e-9)
+        weight = trusted / (1.0 + distance / typical.clamp(min=1e-6)) ** 2
     unseen = (trusted > 0).sum(2) < _LEAST
     rotation = torch.where(unseen[..., None, None], rotation[:, :1], rotation)
     translation = torch.where(unseen[..., None], translation[:, :1], translation)
@@ -45,33 +52,10 @@ def part_poses(clouds: Clouds, perceived: Perceived) -> tuple[Tensor, Tensor, Te
     return rotation, center * metres + clouds.center[:, None], perceived.box_size * unit * metres
 
 
-def root_rotation(clouds: Clouds, votes: Votes) -> Tensor:
-    """(B, 3, 3) of ``T_camera_root``, from the points that are likely of the root."""
-    weight = votes.level_logits.softmax(-1)[..., 0] * votes.own_logits.sigmoid() * _surety(votes)
-    return _robust_procrustes(votes.canonical, clouds.points, weight[:, None])[0][:, 0]
-
-
-def _robust_procrustes(source: Tensor, target: Tensor, trusted: Tensor) -> tuple[Tensor, Tensor]:
-    """:func:`procrustes` with weights that fall where points stay apart."""
-    weight = trusted
-    for _ in range(_ROUNDS):
-        rotation, translation = procrustes(source, target, weight)
-        off = rotate(rotation[:, :, None], source[:, None]) + translation[:, :, None] - target[:, None]
-        distance = off.square().sum(-1)
-        typical = (distance * weight).sum(2, keepdim=True) / weight.sum(2, keepdim=True).clamp(min=1e-9)
-        weight = trusted / (1.0 + distance / typical.clamp(min=1e-6)) ** 2
-    return rotation, translation
-
-
-def _surety(seen: Perceived | Votes) -> Tensor:
-    """(B, N) weight of each point by how sure its place is."""
-    return (-seen.spread.clamp(-4.0, 2.0)).exp()
-
-
 def trust(perceived: Perceived) -> Tensor:
     """(B, P, N) weight of each point for each part: 0 unless it is labelled so, less where its place is unsure."""
     member = torch.nn.functional.one_hot(perceived.part, perceived.part_logits.shape[2]).transpose(1, 2)
-    return member * _surety(perceived)[:, None]
+    return member * (-perceived.spread.clamp(-4.0, 2.0)).exp()[:, None]
 
 
 def start(clouds: Clouds, perceived: Perceived, references: Shapes, count: int) -> tuple[Shapes, Theta]:

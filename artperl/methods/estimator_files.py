@@ -108,7 +108,6 @@ def load_estimator(
         sizes = _Sizes(
             from_json_values(_PerceptionSize, settings.get("perception")),
             None if settings.get("boxes") is None else from_json_values(_BoxesSize, settings["boxes"]),
-            None if settings.get("first_look") is None else from_json_values(_PerceptionSize, settings["first_look"]),
         )
         told = settings.get("options")
         known = {name: told[name] for name in told if name not in _GONE} if isinstance(told, dict) else told
@@ -129,11 +128,10 @@ def load_estimator(
     base = read_shape_base(folder / BASE)
     if base.embeddings is not None and base.embeddings.shape[1] != EMBEDDED * base.shapes.trees.num_rows:
         raise DatasetError("its embeddings are not of its objects", folder / BASE, AGAIN)
-    perception, boxes, first = networks["perception"], networks.get("boxes"), networks.get("first_look")
+    perception, boxes = networks["perception"], networks.get("boxes")
     assert isinstance(perception, Perception)
     assert isinstance(boxes, Boxes | None)
-    assert isinstance(first, Perception | None)
-    return Estimator(perception, base, options, calibration, boxes, part_calibration, first)
+    return Estimator(perception, base, options, calibration, boxes, part_calibration)
 
 
 def _load_stored(
@@ -228,15 +226,11 @@ class _Sizes:
 
     perception: _PerceptionSize
     boxes: _BoxesSize | None
-    first_look: _PerceptionSize | None
 
     @property
     def largest(self) -> dict[str, tuple[int, int]]:
         """Shape of a tensor of each network that is among its largest, by its name."""
-        looks = {"perception": self.perception, "first_look": self.first_look}
-        shapes = {
-            f"{name}.backbone.whole.0.weight": (8 * size.width, 8 * size.width) for name, size in looks.items() if size
-        }
+        shapes = {"perception.backbone.whole.0.weight": (8 * self.perception.width, 8 * self.perception.width)}
         if self.boxes is not None:
             shapes["boxes.among.0.weight"] = self.boxes.width, 6 * self.boxes.width
         return shapes
@@ -246,8 +240,6 @@ class _Sizes:
         networks: dict[str, nn.Module] = {"perception": Perception(**asdict(self.perception))}
         if self.boxes is not None:
             networks["boxes"] = Boxes(**asdict(self.boxes))
-        if self.first_look is not None:
-            networks["first_look"] = Perception(**asdict(self.first_look))
         return networks
 
 

@@ -25,7 +25,6 @@ from artperl.core.device import find_device
 from artperl.core.estimate import Estimate, estimate_of_fit, widen
 from artperl.core.threads import steady_torch
 from artperl.fitting.hypotheses import Context, Fit
-from artperl.fitting.initial_pose import root_rotation
 from artperl.fitting.normal_alignment import align_normals
 from artperl.fitting.options import EstimatorOptions
 from artperl.fitting.part_symptoms import part_symptoms
@@ -36,6 +35,7 @@ from artperl.methods.tracking import track
 from artperl.methods.views import estimate_frames, estimate_views
 from artperl.perception.cloud_checks import cloud_warnings, with_size
 from artperl.perception.label_smoothing import smooth_perceived
+from artperl.perception.mirroring import votes_both_ways
 from artperl.perception.network import Perceived, Perception, Votes
 from artperl.perception.part_grouping import group_votes
 from artperl.perception.preprocess import Cloud
@@ -46,8 +46,6 @@ from artsim.errors import ArtsimError
 
 _LATE_POINTS = 8192
 """Points that tell normals."""
-_FIRST_POINTS = 2048
-"""Points of a first look."""
 _OWN = 0.9
 """Probability from which a point is taken for one of the object: a foreign point moves faces of boxes, while a point of
 the object that is left out is missed by nobody."""
@@ -73,8 +71,6 @@ class Estimator:
     boxes : Boxes, optional
         Without one, boxes are the reference's, enlarged to hold the points.
     part_calibration : PartCalibration, optional
-    first_look : Perception, optional
-        By votes. With one, perception sees the cloud turned to the rest frame as the first look has it.
     """
 
     name: ClassVar[str] = "full"
@@ -84,12 +80,9 @@ class Estimator:
     calibration: Calibration = field(default_factory=Calibration)
     boxes: Boxes | None = None
     part_calibration: PartCalibration = field(default_factory=PartCalibration)
-    first_look: Perception | None = None
 
     def __post_init__(self) -> None:
         self.perception.eval()
-        if self.first_look is not None:
-            self.first_look.to(self.perception.device).eval()
         self.base = self.base.to(self.perception.device)
         if self.boxes is not None:
             self.boxes.to(self.perception.device)
@@ -125,13 +118,12 @@ class Estimator:
 
     def networks(self) -> dict[str, nn.Module]:
         """Its networks by name."""
-        networks = {"perception": self.perception, "boxes": self.boxes, "first_look": self.first_look}
+        networks = {"perception": self.perception, "boxes": self.boxes}
         return {name: network for name, network in networks.items() if network is not None}
 
     def settings(self) -> dict[str, Any]:
         """Sizes of its networks and options, in JSON's terms."""
-        sizes = {"perception": ("num_rows", "width", "votes"), "boxes": ("num_rows", "width")}
-        sizes["first_look"], own = sizes["perception"], self.networks()
+        sizes, own = {"perception": ("num_rows", "width", "votes"), "boxes": ("num_rows", "width")}, self.networks()
         return {
             **{net: {key: getattr(own[net], key) for key in keys} for net, keys in sizes.items() if net in own},
             "options": changed_values(asdict(self.options), asdict(EstimatorOptions())),
@@ -258,15 +250,8 @@ class Estimator:
 
     def perceive(self, clouds: Clouds, clock: Clock) -> tuple[Perceived | Votes, NDArray[np.float64]]:
         """What a network sees of one cloud, smoothed; and the probability of each point to be of the object."""
-        points = clouds.points
-        if self.first_look is not None:
-            with clock("first look"):
-                few = replace(clouds, points=points[:, :_FIRST_POINTS])
-                first = self.first_look(few.points, _FIRST_POINTS)
-                assert isinstance(first, Votes)
-                points = points @ root_rotation(few, first)
         with clock("perception"):
-            seen = self.perception(points, self.options.num_points)
+            seen = votes_both_ways(self.perception, clouds.points, self.options.num_points)
             own = seen.own_logits[0].sigmoid().double().cpu().numpy()
         if not (self.options.label_smoothing or (own < _OWN).any()):
             return seen, own

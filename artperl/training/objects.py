@@ -48,7 +48,7 @@ class TrainingObjects:
         base = _base_of([*procedural, *given], options)
         data = DataOptions(
             options.categories, options.parts, given, options.dataset, options.sample, options.stretched, options.noisy,
-            options.degraded, options.first_look is not None,
+            options.degraded,
         )  # fmt: skip
         if options.dataset is not None:  # a dataset that does not fit is an error before anything is learnt
             points = options.num_points * (options.denser if options.dense_steps else 1)

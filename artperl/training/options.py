@@ -63,9 +63,6 @@ class TrainOptions:
     """Folder of a dataset to learn from, its train split, instead of fresh objects."""
     start_from: str | None = None
     """Folder of an estimator whose networks are trained further; by default they start at random."""
-    first_look: str | None = None
-    """Folder of an estimator whose perception tells how a cloud is turned; then perception learns from clouds that are
-    turned about to the rest frame, where fronts face one way."""
     seed: int = 0
     base_objects: int = 64
     """Reference objects of each category."""

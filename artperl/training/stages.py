@@ -9,7 +9,6 @@ from torch import nn
 
 from artperl.core.category_prior import CategoryPrior
 from artperl.fitting.options import EstimatorOptions
-from artperl.methods.estimator_files import load_estimator
 from artperl.methods.full import Estimator
 from artperl.methods.protocol import Stored
 from artperl.perception.network import Perception
@@ -80,15 +79,14 @@ def _full_stages(options: TrainOptions) -> list[Stage]:
 
 
 def _full_estimator(context: Context) -> Estimator:
-    """With the parent's boxes, if parts are found as the parent finds them; the first look is another estimator's."""
+    """With the parent's boxes, if parts are found as the parent finds them."""
     perception, parent, options = context.state.networks["perception"], context.parent, context.options
-    first = None if options.first_look is None else load_estimator(options.first_look).perception
     assert isinstance(parent, Estimator | None)
     assert isinstance(perception, Perception)
     alike = parent is not None and parent.perception.votes == perception.votes
     return Estimator(
         perception, context.objects.base, EstimatorOptions(num_points=options.denser * options.num_points),
-        boxes=parent.boxes if parent is not None and alike else None, first_look=first,
+        boxes=parent.boxes if parent is not None and alike else None,
     )  # fmt: skip
 
 

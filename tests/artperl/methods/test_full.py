@@ -81,15 +81,19 @@ def test_an_estimate_takes_one_thread_and_leaves_torch_as_it_was(estimator: Esti
 
 
 class Voter(Oracle):
-    """Knows of each point what its part is like, and no numbers."""
+    """Knows of each point what its part is like, and no numbers, also on the mirror image."""
 
     votes = True
 
     def forward(self, points: torch.Tensor, standard: int = 0) -> Votes:  # type: ignore[override]
         rows = training_rows(self.sample, 2048, self.num_rows)
         clouds, truth = to_batch({k: torch.from_numpy(np.asarray(v)[None]) for k, v in rows.items()})
-        nearest = torch.cdist(points, clouds.points).argmin(-1)[0]
-        return Votes(**{name: v if v.ndim == 1 else v[:, nearest] for name, v in vars(true_votes(truth)).items()})
+        apart = {side: torch.cdist(points * points.new_tensor([side, 1.0, 1.0]), clouds.points) for side in (1.0, -1.0)}
+        side = min(apart, key=lambda own: float(apart[own].min(-1)[0].mean()))
+        nearest = apart[side].argmin(-1)[0]
+        votes = Votes(**{name: v if v.ndim == 1 else v[:, nearest] for name, v in vars(true_votes(truth)).items()})
+        mirror = points.new_tensor([1.0, side, 1.0])
+        return replace(votes, canonical=votes.canonical * mirror, box=votes.box * torch.cat([mirror, torch.ones(3)]))
 
 
 @pytest.mark.slow
