@@ -189,7 +189,7 @@ def measure(estimator: Estimator, samples: Sequence[Sample], same: dict[str, Loo
     return {
         "parts": total, "views": views, **shares, "found": round(100 * found / views, 1),
         "views right": round(100 * whole / views, 1), "other number": round(100 * number / views, 1),
-        "AUROC": None if curve is None else round(curve, 2), "off": off,
+        **({} if curve is None else {"AUROC": round(curve, 2)}), "off": off,
     }  # fmt: skip
 
 

@@ -129,7 +129,7 @@ def test_the_program_writes_pages_of_objects_and_datasets(tmp_path: Path) -> Non
 
 def test_what_is_no_dataset_no_object_or_no_picture_is_said(tmp_path: Path) -> None:
     for path in (tmp_path / "nothing", tmp_path):
-        with pytest.raises(ArtsimError, match="or the folder of a dataset"):
+        with pytest.raises(ArtsimError, match="the folder of a dataset"):
             View(path, html=tmp_path / "a.html").run()
     for wrong in ({"out": tmp_path / "README.md"}, {"html": tmp_path / "README.md"}, {"rerun": tmp_path / "README.md"}):
         with pytest.raises(ArtsimError, match=r"README\.md: it is no \.\w+ file\. Fix: name it README\."):

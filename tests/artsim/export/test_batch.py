@@ -105,8 +105,8 @@ def test_ctrl_c_keeps_whole_objects_and_leaves_nothing_else(tmp_path: Path) -> N
     options = ["--category", "laptop", "--count", "2000", "--workers", "1", "--out", str(tmp_path)]
     run = subprocess.Popen(
         [sys.executable, "-c", "from artsim.commands.verbs import main; main()", "generate-objects", *options],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a job in the background ignores Ctrl-C
     )
@@ -114,7 +114,7 @@ def test_ctrl_c_keeps_whole_objects_and_leaves_nothing_else(tmp_path: Path) -> N
     while not list(tmp_path.glob("laptop/[0-9]*")) and time.monotonic() < deadline:
         time.sleep(0.05)
     run.send_signal(signal.SIGINT)
-    output, _ = run.communicate(timeout=60)
+    _, output = run.communicate(timeout=60)
     assert run.returncode == 130
     assert "whole objects are kept" in output
     made = sorted((tmp_path / "laptop").iterdir())
