@@ -43,8 +43,8 @@ def serve(path: Path, split: str | None = None, port: int = 0) -> None:
         When there is no dataset or no sample, or the port is in use.
     """
     with DatasetServer(Dataset(path, split), path.resolve().name, port) as server:
-        print(f"open {server.url} in a browser of this machine; stop with Ctrl-C", flush=True)
         try:
+            print(f"open {server.url} in a browser of this machine; stop with Ctrl-C", flush=True)
             server.serve_forever()
         except KeyboardInterrupt:
             print("\nstopped", flush=True)
