@@ -1,13 +1,12 @@
-# docker build -t artsim . && docker run --rm -v "$PWD/out:/work/out" artsim artperl demo
+# docker build -t artsim . && docker run --rm -v "$PWD/out:/data/out" artsim artperl demo
+# For a CPU build of torch, a tenth of the default one, pip's own settings say where it is:
+# docker build --secret id=pip,src=pip.conf -t artsim .
 FROM python:3.11-slim
 WORKDIR /opt/artsim
 COPY . .
-# A CPU build of torch, a tenth of the default one: put its wheel into wheels/, or give an index in TORCH.
-ARG TORCH=""
-RUN mkdir -p wheels \
-    && pip install --no-cache-dir -c constraints.txt --find-links wheels $TORCH '.[view,train,sim]'
+RUN --mount=type=secret,id=pip,target=/etc/pip.conf pip install --no-cache-dir -c constraints.txt '.[view,train,sim]'
 # Renderers of extras need more: scripts/install-system.sh, scripts/install-vulkan.sh.
-RUN useradd --create-home user && mkdir /work && chown user /work
+RUN useradd --create-home user && mkdir /data && chown user /data
 USER user
-WORKDIR /work
+WORKDIR /data
 CMD ["artsim", "doctor"]

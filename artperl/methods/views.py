@@ -165,7 +165,8 @@ def as_one_object(estimates: Sequence[Estimate]) -> list[Estimate]:
     anchor = max(estimates, key=_sureness)
     frames = [_Frame.of(anchor, other) for other in estimates]
     joints = [_choose(anchor, frames, k) for k in range(len(anchor.state))]
-    return [_in_frame(anchor, joints, frame, frames) for frame in frames]
+    steps = np.array([[frame.step(anchor, k, joint) for k, joint in enumerate(joints)] for frame in frames])
+    return [_in_frame(anchor, joints, frame, own, steps) for frame, own in zip(frames, steps, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,6 +207,11 @@ class _Frame:
         T = compose_transform(anchor.translation[parent], anchor.rotation[parent]) @ invert_transform(self.box[parent])
         return T @ self.box[k] @ invert_transform(compose_transform(anchor.translation[k], anchor.rotation[k])), T
 
+    def step(self, anchor: Estimate, k: int, joint: Joint) -> float:
+        """How far part k has moved along a joint; 0 for the root, and where it is not seen."""
+        found = self.displacement(anchor, k) if k else None
+        return 0.0 if found is None else joint.amount(found[0], anchor.translation[k])
+
 
 def _choose(anchor: Estimate, frames: Sequence[_Frame], k: int) -> Joint:
     """Of the joints that frames have for part k, that which explains its motion best; else the hinge of the motion."""
@@ -230,8 +236,8 @@ def _choose(anchor: Estimate, frames: Sequence[_Frame], k: int) -> Joint:
     return min([best, hinge(most, center)], key=left)
 
 
-def _in_frame(anchor: Estimate, joints: Sequence[Joint], frame: _Frame, frames: Sequence[_Frame]) -> Estimate:
-    """The anchor's object as a frame shows it."""
+def _in_frame(anchor: Estimate, joints: Sequence[Joint], frame: _Frame, step: Array, steps: Array) -> Estimate:
+    """The anchor's object as a frame shows it, whose parts have made steps (K,), of those of all frames (F, K)."""
     K, own = len(joints), frame.estimate
     move = np.tile(np.eye(4), (K, 1, 1))  # from the anchor's camera frame, as carried by each part, to this one
     move[0] = frame.box[0] @ invert_transform(compose_transform(anchor.translation[0], anchor.rotation[0]))
@@ -243,11 +249,9 @@ def _in_frame(anchor: Estimate, joints: Sequence[Joint], frame: _Frame, frames: 
             at_rest = anchor.T_camera_part[k] @ invert_transform(anchor.T_camera_part[parent])
             kept = joint.kind == anchor.joint_type[k] and np.array_equal(joint.axis, anchor.joint_axis[k])
             start = float(state[k]) if kept else joint.amount(at_rest, center)
-            steps = [0.0 if (d := f.displacement(anchor, k)) is None else joint.amount(d[0], center) for f in frames]
-            step = steps[frames.index(frame)]
-            state[k], move[k] = start + step, move[parent] @ joint.motion(step)
+            state[k], move[k] = start + step[k], move[parent] @ joint.motion(float(step[k]))
             if not kept:
-                limits[k] = start + min(steps), start + max(steps)
+                limits[k] = start + steps[:, k].min(), start + steps[:, k].max()
         posed = joint.moved(move[parent])
         axis[k], origin[k] = posed.axis, posed.origin
     T = move @ anchor.T_camera_part

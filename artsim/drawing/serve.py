@@ -4,6 +4,7 @@ import json
 import re
 import threading
 from collections.abc import Iterable
+from contextlib import ExitStack
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
@@ -75,13 +76,12 @@ class DatasetServer(ThreadingHTTPServer):
             super().__init__((_HOST, port), _Answer)
         except (OSError, OverflowError) as error:
             raise ConfigError(f"port {port} cannot be used ({error})", "port", "leave it out for a free one") from error
-        try:
+        with ExitStack() as stack:  # a damaged sample, or Ctrl-C, frees the port
+            stack.callback(self.server_close)
             index = index_of(track("read samples", iter(dataset), total=len(dataset), unit="sample", leave=False))
             content = PageContent(f"{printable(name)}: {len(dataset)} samples", error_word=SENSOR_ERROR, index=index)
             self.page = frames_page(content, [])
-        except BaseException:
-            self.server_close()
-            raise
+            stack.pop_all()
         self._dataset, self._one_reads = dataset, threading.Lock()
 
     @property

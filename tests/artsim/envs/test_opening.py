@@ -16,6 +16,7 @@ from artsim.errors import ConfigError
 from artsim.families import make
 from artsim.physics import PhysicsOptions, Simulation
 from artsim.renderers import render
+from tests.conftest import installed
 
 ID = "artsim/Opening-v0"
 
@@ -32,7 +33,7 @@ def episode(envs: OpeningVectorEnv, policy: Any, seed: int = 0) -> tuple[Any, An
 
 @pytest.mark.parametrize(("category", "seed"), [("drawer", 0), ("microwave", 0), ("oven", 1), ("washing_machine", 1)])
 def test_a_joint_that_is_let_go_moves_as_in_the_simulation(category: str, seed: int) -> None:
-    pytest.importorskip("mujoco")
+    installed("mujoco")
     handle = find_handles(make(category, seed))[0]
     joints, reach = HeldJoints([handle]), handle.joint.upper
     joints.q, joints.speed = np.array([0.5 * reach]), np.array([reach])

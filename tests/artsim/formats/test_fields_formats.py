@@ -131,7 +131,7 @@ def test_op_align_has_the_cloud_the_parts_and_the_joints(exact: Dataset, tmp_pat
     assert len(files) == len(exact)
     for file in files:
         sample = samples[int(file.stem)]
-        with np.load(file, allow_pickle=True) as archive:
+        with np.load(file, allow_pickle=True) as archive:  # as its loader reads it; this test wrote the file
             record = archive["arr_0"].item()
         read = read_op_align(file)
         assert record.keys() == read.keys()
@@ -216,7 +216,7 @@ def test_two_states_differ_by_the_joint_and_depth_lies_on_the_surface(
 
 
 def test_hugging_face_columns_are_the_samples_and_digests_are_right(exact: Dataset, tmp_path: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet")
+    parquet = installed("pyarrow.parquet")
     from artsim.common.files import file_sha256
 
     out = converted(exact, "huggingface", tmp_path / "out")
@@ -237,7 +237,7 @@ def test_hugging_face_columns_are_the_samples_and_digests_are_right(exact: Datas
 
 
 def test_lerobot_episodes_are_the_recordings(tmp_path: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet")
+    parquet = installed("pyarrow.parquet")
     rng = np.random.default_rng(0)
     recordings = [
         Recording("open", rng.normal(size=(T, J)), rng.normal(size=(T, J)), rng.normal(size=(T, 5, 3)).astype("f4"))
@@ -270,7 +270,7 @@ def test_lerobot_episodes_are_the_recordings(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_motions_become_a_lerobot_dataset(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     installed("mujoco")
-    parquet = pytest.importorskip("pyarrow.parquet")
+    parquet = installed("pyarrow.parquet")
     from artsim.commands.convert import Convert
     from artsim.physics import EpisodeOptions, open_motions, record
 
