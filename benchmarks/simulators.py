@@ -63,8 +63,8 @@ Run = tuple[Array, Array]
 """States (S, J) and speeds (S, J) over time of the joints that are driven."""
 
 
-def in_mujoco(folder: Path, joints: list[LinkJoint], way: float, seconds: float) -> Run:
-    """By the motors of the MJCF file, each at full control."""
+def driven_in_mujoco(folder: Path, joints: list[LinkJoint], way: float) -> tuple[Any, Any, list[int], list[int]]:
+    """A model of MuJoCo, its data with each motor at full control, and where joints have their states and speeds."""
     import mujoco
 
     model = mujoco.MjModel.from_xml_path(str(folder / FORMATS["mjcf"]))
@@ -72,6 +72,14 @@ def in_mujoco(folder: Path, joints: list[LinkJoint], way: float, seconds: float)
     data.ctrl[:] = way
     places = [model.joint(joint.name).qposadr[0] for joint in joints]
     degrees = [model.joint(joint.name).dofadr[0] for joint in joints]
+    return model, data, places, degrees
+
+
+def in_mujoco(folder: Path, joints: list[LinkJoint], way: float, seconds: float) -> Run:
+    """By the motors of the MJCF file, each at full control."""
+    import mujoco
+
+    model, data, places, degrees = driven_in_mujoco(folder, joints, way)
     seen = []
     for _ in range(round(seconds / model.opt.timestep)):
         mujoco.mj_step(model, data)
@@ -199,16 +207,11 @@ def newton_file(file: Path) -> LoadedFile:
 
 def in_mujoco_warp(folder: Path, joints: list[LinkJoint], way: float, seconds: float) -> Run:
     """By the motors of the MJCF file, each at full control."""
-    import mujoco
     import mujoco_warp
     import warp
 
     warp.config.quiet = True
-    model = mujoco.MjModel.from_xml_path(str(folder / FORMATS["mjcf"]))
-    data = mujoco.MjData(model)
-    data.ctrl[:] = way
-    places = [model.joint(joint.name).qposadr[0] for joint in joints]
-    degrees = [model.joint(joint.name).dofadr[0] for joint in joints]
+    model, data, places, degrees = driven_in_mujoco(folder, joints, way)
     seen = []
     with warp.ScopedDevice("cpu"), silence_output():
         there, moving = mujoco_warp.put_model(model), mujoco_warp.put_data(model, data)
