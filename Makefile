@@ -23,7 +23,7 @@ check: $(VENV)/.ready-dev lint  ## lint, types and the fast tests: in two minute
 	$(PYTEST) --dist worksteal -m "not slow"
 
 test: system $(VENV)/.ready-dev lint  ## lint, types and every test: what continuous integration runs
-	$(TIMED) tests env $(PYTEST) --dist loadfile --durations 30 --durations-min 1
+	$(TIMED) tests env $(PYTEST) --dist loadfile --no-loadscope-reorder --durations 30 --durations-min 1
 
 lint: export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 lint: $(VENV)/.ready-dev  ## format, lint, types and import contracts

@@ -48,10 +48,12 @@ from artsim.errors import ArtsimError, ConfigError
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 
+Array = NDArray[np.float64]
 Told = Literal["nothing", "level", "box", "joint", "votes"]
 CATEGORIES = ("storage_furniture", "table", "refrigerator", "safe", "microwave", "oven")
 CAUSES = ("right", "hidden", "shut", "body", "merged", "type", "axis", "turn", "box", "failed")
-_HIDDEN, _SHUT = 20, 0.02
+SEEN, SHUT = 20, 0.02
+"""Points from which a part is seen, and share of its range below which it is shut."""
 _DEGREES, _DIAGONALS = 10.0, 0.05
 
 
@@ -96,6 +98,12 @@ class Oracle(Estimator):
         return replace(seen, **{name: told[name] for name in names}), own
 
 
+def openness(sample: Sample, k: int) -> float:
+    """Share of its range that a part is open by; 1 of what turns without end."""
+    low, high = sample.joint_limits[k]
+    return float(abs(sample.joint_state[k] - sample.joint_rest[k]) / (high - low)) if np.isfinite(high - low) else 1.0
+
+
 def causes(estimate: Estimate | None, sample: Sample, symmetric: LooksSame) -> list[str]:
     """Of each moving part, why it is not found."""
     moving = [k for k in range(1, len(sample.joint_type)) if np.ptp(sample.joint_limits[k]) > 0]
@@ -109,16 +117,14 @@ def causes(estimate: Estimate | None, sample: Sample, symmetric: LooksSame) -> l
     found = []
     for k in moving:
         points = sample.part == k
-        low, high = sample.joint_limits[k]
-        share = abs(sample.joint_state[k] - sample.joint_rest[k]) / (high - low) if np.isfinite(high - low) else 1.0
         taken = estimate.part[points]
         m = int(np.bincount(taken[taken >= 0], minlength=1).argmax())
         own = estimate.part == m
         if near[:, k].any():
             cause = "right"
-        elif points.sum() < _HIDDEN:
+        elif points.sum() < SEEN:
             cause = "hidden"
-        elif share < _SHUT:
+        elif openness(sample, k) < SHUT:
             cause = "shut"
         elif m == 0:
             cause = "body"
@@ -151,11 +157,10 @@ def real(category: str) -> list[ArticulatedObject]:
     return list(real_objects(category, Path(folder), split, "dev"))
 
 
-def tested(category: str, options: Options) -> tuple[list[Sample], dict[str, LooksSame]]:
-    """Views of a category's objects, and how they look the same."""
-    made = options.procedural
-    objects = objects_of([category], made, TEST_SEEDS, "any") if made else real(category)
-    return samples_of(objects, options.views), object_symmetries(objects)
+def tested(category: str, views: int, procedural: int) -> tuple[list[Sample], dict[str, LooksSame]]:
+    """Views of a category's objects, real ones of the dev half or so many procedural ones; how they look the same."""
+    objects = objects_of([category], procedural, TEST_SEEDS, "any") if procedural else real(category)
+    return samples_of(objects, views), object_symmetries(objects)
 
 
 def measure(estimator: Estimator, samples: Sequence[Sample], same: dict[str, LooksSame], told: Told) -> dict[str, Any]:
@@ -200,7 +205,7 @@ def main(options: Options) -> None:
     columns = ("parts", *CAUSES, "found", "views right", "other number", "AUROC", "off")
     print(f"{'%':20s}{'told':9s}" + "".join(f"{name:>13s}" for name in columns))
     for category in options.categories:
-        samples, same = tested(category, options)
+        samples, same = tested(category, options.views, options.procedural)
         for told in options.told:
             row = result[category][told] = measure(estimator, samples, same, told)
             print(f"{category:20s}{told:9s}" + "".join(f"{row.get(name, 0):13g}" for name in columns), flush=True)

@@ -74,6 +74,11 @@ def pytest_sessionstart() -> None:
         os.sched_setaffinity(0, processors)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files of few slow tests come first: what comes last is short, and no process waits long for another one."""
+    items.sort(key=lambda item: item.path.parent != ROOT / "tests")
+
+
 def pytest_collection_finish() -> None:
     """Thousands of collected tests stay: no collection of garbage need look at them, and ManiSkill collects often."""
     gc.collect()

@@ -19,6 +19,7 @@ from artperl.core.neighbours import tree_of
 from artperl.core.pose import Posed, Theta, joint_axes, joint_states, pose_parts, reach
 from artperl.core.shapes import Observed, Shapes
 from artperl.core.trees import KINDS
+from artperl.core.ways import likely_ways, unsure
 from artsim.common.outputs import output_file, write_output
 from artsim.common.showing import Showable
 from artsim.errors import ConfigError
@@ -28,6 +29,8 @@ Array = NDArray[np.float64]
 HEAD = ("part", "joint", "state", "limits", "box centre, m", "rotation vector, deg", "box size, m", "seen", "sure")
 _MOST_PARTS = 40
 """Parts that are listed: as many as fit a screen."""
+_NOT_IN_JSON = ("part", "part_symptoms", "ways")
+"""The part of every point is long, and likely ways are told by their names."""
 
 _ENOUGH_TO_WIDEN = 32
 """Points of a part from which they say how large it is."""
@@ -91,6 +94,9 @@ class Estimate(Showable):
         estimated size. Infinite for what turns without end, 0 for the root.
     warnings : tuple of str
         What looks wrong with the cloud, one sentence with its fix each.
+    ways : (K, W) float
+        Probability that each part opens in each of :data:`artperl.core.ways.WAYS`; (0, 0) where the estimator does not
+        tell.
     """
 
     rotation: Array
@@ -117,6 +123,15 @@ class Estimate(Showable):
     part_names: tuple[str, ...] = ()
     joint_limits: Array = field(default_factory=lambda: np.zeros((0, 2)))
     warnings: tuple[str, ...] = ()
+    ways: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def alternatives(self) -> tuple[dict[str, float], ...]:
+        """Of each part, in which of :data:`artperl.core.ways.WAYS` it may open, the likeliest first, and how likely.
+
+        Empty for the root, and where the estimator does not tell. Ways of less than 5 % are left out.
+        """
+        return likely_ways(self.ways, self.joint_type)
 
     @property
     def symptoms(self) -> Symptoms:
@@ -158,8 +173,8 @@ class Estimate(Showable):
 
     def to_dict(self) -> dict[str, Any]:
         """The estimate in JSON's terms, but for the part of every point: lists, and None for what is infinite."""
-        record = {name: _plain(value) for name, value in vars(self).items() if name not in ("part", "part_symptoms")}
-        return {**record, "state_unit": list(self.state_unit)}
+        record = {name: _plain(value) for name, value in vars(self).items() if name not in _NOT_IN_JSON}
+        return {**record, "state_unit": list(self.state_unit), "alternatives": list(self.alternatives)}
 
     def save(self, path: str | Path, notes: Sequence[str] = ()) -> Path:
         """Write the estimate as ``.json``, as :meth:`to_dict` has it, or as ``.npz`` with the part of every point.
@@ -202,6 +217,7 @@ class Estimate(Showable):
         lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
         more = len(self.joint_type) - _MOST_PARTS
         lines += [f"... and {more} parts more"] if more > 0 else []
+        lines += unsure(self.alternatives, self.part_names)
         return "\n".join([*(f"warning: {text}" for text in self.warnings), summary(self), *lines])
 
     def __repr__(self) -> str:

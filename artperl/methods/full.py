@@ -24,6 +24,7 @@ from artperl.core.confidence import Calibration, PartCalibration
 from artperl.core.device import find_device
 from artperl.core.estimate import Estimate, estimate_of_fit, widen
 from artperl.core.threads import steady_torch
+from artperl.core.ways import way_chances
 from artperl.fitting.hypotheses import Context, Fit
 from artperl.fitting.normal_alignment import align_normals
 from artperl.fitting.options import EstimatorOptions
@@ -37,7 +38,7 @@ from artperl.perception.cloud_checks import cloud_warnings, with_size
 from artperl.perception.label_smoothing import smooth_perceived
 from artperl.perception.mirroring import votes_both_ways
 from artperl.perception.network import Perceived, Perception, Votes
-from artperl.perception.part_grouping import group_votes
+from artperl.perception.part_grouping import PerceivedTree, group_votes
 from artperl.perception.preprocess import Cloud
 from artperl.retrieval.part_names import part_names
 from artperl.retrieval.references import retrieve_references
@@ -217,6 +218,9 @@ class Estimator:
                 part_names=part_names(self.base, fit.row, fit.shapes),
                 warnings=with_size(warnings, estimate.size, self.categories),
             )
+            if isinstance(perceived, PerceivedTree):
+                ways = way_chances(perceived.way_distance[0, : len(estimate.state)].double().cpu().numpy())
+                estimate = replace(estimate, ways=ways)
             symptoms = part_symptoms(fit.shapes, fit.observed, fit.theta, perceived.to("cpu"), estimate.visibility)
             estimate = estimate.judged(self.calibration, self.part_calibration, symptoms)
             return estimate, BoxContext.of(cloud, clouds, perceived), fit

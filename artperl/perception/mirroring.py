@@ -26,9 +26,10 @@ def votes_both_ways(network: Perception, points: Tensor, standard: int) -> Perce
     image = network(points * points.new_tensor(_CAMERA), standard)
     assert isinstance(image, Votes)
     mirror = points.new_tensor(_OBJECT)
+    joint = image.joint * torch.cat([mirror, -mirror, mirror])  # a turn's axis is a pseudovector
     image = replace(
         image, canonical=image.canonical * mirror, box=image.box * torch.cat([mirror, torch.ones_like(mirror)]),
-        level_logits=image.level_logits.log_softmax(-1), joint=seen.joint,
+        level_logits=image.level_logits.log_softmax(-1), joint=seen.joint, mirrored_joint=joint,
     )  # fmt: skip
-    seen = replace(seen, level_logits=seen.level_logits.log_softmax(-1))
+    seen = replace(seen, level_logits=seen.level_logits.log_softmax(-1), mirrored_joint=joint)
     return replace(seen, **{f.name: 0.5 * (getattr(seen, f.name) + getattr(image, f.name)) for f in fields(Votes)})

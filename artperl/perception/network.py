@@ -77,13 +77,17 @@ class Votes(Batch):
     """(B, N, 6) float. Centre and size of the part's box."""
     joint: Tensor
     """(B, N, 9) float. The part's joint as :attr:`artperl.data.truth.Truth.joint` has it."""
+    mirrored_joint: Tensor
+    """(B, N, 9) float. The same by the cloud's mirror image, where that was looked at, too."""
     level_logits: Tensor
     """(B, N, P) float. How many joints are between the root and the part."""
 
     def of_points(self, chosen: Tensor) -> Votes:
         """Of those points alone that are chosen (N,) bool."""
-        return _of_points(self, chosen, ("canonical", "spread", "own_logits", "box", "joint", "level_logits"))
+        return _of_points(self, chosen, _OF_POINTS)
 
+
+_OF_POINTS = ("canonical", "spread", "own_logits", "box", "joint", "mirrored_joint", "level_logits")
 
 Seen = TypeVar("Seen", Perceived, Votes)
 
@@ -143,6 +147,7 @@ class Perception(nn.Module):
                 log_diagonal=whole[:, -1],
                 box=torch.cat([canonical.detach() + own[..., :3], 0.5 * functional.softplus(2.0 * own[..., 3:])], -1),
                 joint=point[..., P + 10 : P + 19],
+                mirrored_joint=point[..., P + 10 : P + 19],
                 level_logits=point[..., :P],
             )
         boxes = whole[:, P : 7 * P].reshape(-1, P, 6)

@@ -16,6 +16,7 @@ from torch import Tensor
 
 from artperl.core.labels import label_log_odds
 from artperl.core.part_order import visible_order
+from artperl.core.ways import way_distances
 from artperl.perception.network import Perceived, Votes
 from artsim.common.compiled import compiled
 
@@ -50,13 +51,16 @@ class PerceivedTree(Perceived):
     """(B, P, 9) float. As :func:`artperl.core.clouds.joint_rows` has it."""
     parent: Tensor
     """(B, P) int64."""
+    way_distance: Tensor
+    """(B, P, W, 2) float. How far votes, of the cloud and of its mirror image, are from each of
+    :data:`artperl.core.ways.WAYS`."""
 
 
 def group_votes(votes: Votes) -> PerceivedTree:
     """Parts of which points tell, in the order that :func:`artperl.core.part_order.visible_order` gives them."""
-    box, joint, level = (values.double().cpu().numpy() for values in (votes.box, votes.joint, votes.level_logits))
-    place = votes.canonical.double().cpu().numpy()
-    rows = [_group(*own) for own in zip(place, box, joint, log_softmax(level, axis=-1), strict=True)]
+    place, box, level = (t.double().cpu().numpy() for t in (votes.canonical, votes.box, votes.level_logits))
+    joints = torch.stack([votes.joint, votes.mirrored_joint], dim=1).double().cpu().numpy()
+    rows = [_group(*own) for own in zip(place, box, joints, log_softmax(level, axis=-1), strict=True)]
     fields = {name: torch.from_numpy(np.stack([row[name] for row in rows])) for name in rows[0]}
     return PerceivedTree(
         canonical=votes.canonical, spread=votes.spread, own_logits=votes.own_logits, log_diagonal=votes.log_diagonal,
@@ -66,7 +70,7 @@ def group_votes(votes: Votes) -> PerceivedTree:
 
 
 def _group(place: Array, box: Array, joint: Array, level_log_odds: Array) -> dict[str, NDArray[Any]]:
-    """Of one cloud and P rows for parts, what :class:`PerceivedTree` says of parts."""
+    """Of one cloud and P rows for parts, what :class:`PerceivedTree` says of parts; (2, N, 9) votes for joints."""
     rows, level = level_log_odds.shape[1], level_log_odds.argmax(1)
     level[level_log_odds[:, 0].argmax()] = 0  # there is a root
     members, depth, fewest = [np.flatnonzero(level == 0)], [0], max(_FEW, round(_FEWEST * len(box)))
@@ -76,7 +80,10 @@ def _group(place: Array, box: Array, joint: Array, level_log_odds: Array) -> dic
         members += [own[group] for group in found]
         depth += [deep] * len(found)
     boxes = np.stack([np.median(box[own], axis=0) for own in members])
-    joints = np.stack([np.median(joint[own], axis=0) for own in members])
+    joints = np.stack([np.median(joint[0, own], axis=0) for own in members])
+    ways = np.array([
+        [way_distances(votes[own], boxes[k, 3:]) for votes in joint] for k, own in enumerate(members)
+    ]).swapaxes(1, 2)  # fmt: skip
     joints[0] = 0.0
     parents = _parents(depth, boxes)
     order = visible_order(parents, boxes[:, :3], boxes[:, 3:])
@@ -92,6 +99,7 @@ def _group(place: Array, box: Array, joint: Array, level_log_odds: Array) -> dic
     return {
         "part_logits": log_odds, "valid_logits": np.where(np.arange(rows) < K, 1.0, -1.0),
         "box_center": pad(boxes[:, :3]), "box_size": pad(boxes[:, 3:]), "joint": pad(joints),
+        "way_distance": pad(ways),
         "parent": pad(np.where(parents < 0, 0, number[parents])),
     }  # fmt: skip
 

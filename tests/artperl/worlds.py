@@ -52,6 +52,7 @@ def true_votes(truth: Truth) -> Votes:
         log_diagonal=truth.diagonal.log(),
         box=truth.of_points(torch.cat([truth.box_center, truth.box_size], dim=-1)),
         joint=truth.of_points(truth.joint),
+        mirrored_joint=truth.of_points(truth.joint),
         level_logits=20.0 * level.float(),
     )  # fmt: skip
 

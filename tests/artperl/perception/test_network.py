@@ -106,7 +106,8 @@ def test_votes_are_learnt_and_losses_vanish_for_true_ones(batch: tuple[Clouds, T
     box = truth.of_points(torch.cat([truth.box_center, truth.box_size], dim=-1))
     true = Votes(
         truth.canonical, votes.spread, 100.0 * truth.own - 50.0, truth.diagonal.log(), box,
-        truth.of_points(truth.joint),        100.0 * torch.nn.functional.one_hot(level, 4).float(),
+        truth.of_points(truth.joint), truth.of_points(truth.joint),
+        100.0 * torch.nn.functional.one_hot(level, 4).float(),
     )  # fmt: skip
     losses = perception_losses(true, truth)
     for name in ("canonical", "own", "boxes", "joints", "level", "diagonal"):

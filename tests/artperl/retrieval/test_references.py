@@ -55,7 +55,8 @@ def test_parts_by_votes_are_looked_for_among_objects_with_their_tree() -> None:
     for row in (2, 7):
         seen = _perceived(whole, row)
         tree = whole.shapes.trees[row : row + 1]
-        groups = PerceivedTree(**vars(seen), joint=whole.joints[row : row + 1], parent=tree.parent)
+        joint = whole.joints[row : row + 1]
+        groups = PerceivedTree(**vars(seen), joint=joint, parent=tree.parent, way_distance=joint.new_zeros(1, 8, 8, 2))
         found = retrieve_references(base, groups, 3)
         rows, shapes = found.row, found.shapes
         K = len(objects[row])
