@@ -17,11 +17,11 @@ _AT_MIDDLE = 0.02
 _SMALL = 0.05
 """Diagonals that are added to half of a box's longest side before a distance is taken over it: votes for small parts
 differ by as much."""
-_SHARPNESS = np.array([1.8, 2.7])
-"""Of distances of votes on a cloud, and on its mirror image. As :data:`_USUAL`, ``python -m benchmarks.ways --fit 40``
-has them from procedural objects that nothing is learnt from."""
-_USUAL = np.array([1.8, -0.7, -0.1, 0.5, -0.1, -0.3, -0.9, -0.2])
-"""Log-odds of each way before anything is seen, but for a constant."""
+_SHARPNESS = np.array([1.4, 1.5])
+"""Of distances of votes on a cloud, and on its mirror image. As :data:`_USUAL`, ``python -m benchmarks.ways --fit 60``
+has them from procedural furniture that nothing is learnt from."""
+_USUAL = np.array([1.6, -3.1, 1.3, 2.4, -3.1, 1.2, 1.3, -1.5])
+"""Log-odds of each way of a front before anything is seen, but for a constant."""
 _LIKELY, _WORTH_SAYING = 0.05, 0.2
 """Probabilities from which a way is told, and another one is said to people."""
 
