@@ -3,22 +3,21 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from artperl.methods.estimator_folders import estimator_fix, folder_of
+from artperl.methods.estimator_folders import SETTINGS, estimator_fix, folder_of
 from artsim.errors import ConfigError
 
 
 def estimator_folder(name: str) -> Path:
-    """Folder of an estimator: one of the package's by its name, a folder of one, or that of a training run.
+    """Folder of an estimator, which there is; see :func:`artperl.methods.estimator_folders.folder_of`.
 
     Raises
     ------
     ConfigError
         When there is none.
     """
-    settings = "estimator.json"
-    for folder in (folder_of(name), Path(name) / "best"):
-        if (folder / settings).is_file():
-            return folder
+    folder = folder_of(name)
+    if (folder / SETTINGS).is_file():
+        return folder
     what = "holds no estimator" if Path(name).is_dir() else "is no estimator"
     raise ConfigError(f"{name!r} {what}", "category", estimator_fix(name))
 

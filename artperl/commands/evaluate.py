@@ -79,7 +79,11 @@ class Evaluate:
         if self.files:
             sources = find_sources(self.files, self.package_root)
             objects = [match_category(source.load(), categories, parts) for source in sources]
-            objects = [replace(obj, category=obj.object_id) if obj.category == "unknown" else obj for obj in objects]
+            named = learnt.get("name")
+            objects = [
+                replace(obj, category=named or obj.object_id) if named or obj.category == "unknown" else obj
+                for obj in objects
+            ]
             samples = samples_of(objects, self.views, options)
         elif not categories:
             raise ConfigError("it knows objects of files, no category", "evaluate", "name them with --files")

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from artperl.methods import StoredMethod
+from artperl.methods.estimator_folders import RUNS, WEIGHTS
+from artsim.common.names import safe_name
 from artsim.errors import ConfigError
 from artsim.loading.roots import PackageRoots
 from artsim.model.draws import StateMode, ViewPreset
@@ -34,10 +36,14 @@ class Train:
 
     To train well: artperl train --category eyeglasses --preset long --out out/eyeglasses
 
-    To make an estimator that comes with the package: artperl train --recipe laptop
+    A category of your own, from 5 files or more: artperl train --objects my_urdfs/ --name mydoor
+
+    Then: artperl estimate cloud.npy --category mydoor
 
     For your robot, from the estimator for any tree:
-    artperl train --files robot.urdf --preset joint --start-from generic --perception-steps 2000
+    artperl train --objects robot.urdf --preset joint --start-from generic --perception-steps 2000
+
+    To make an estimator that comes with the package: artperl train --recipe laptop
 
     On several processors or GPUs, with the same result:
     torchrun --nproc-per-node 2 -m artperl train --category laptop --out out/laptop
@@ -45,14 +51,15 @@ class Train:
     Defaults are those of the preset or the recipe.
     """
 
-    preset: Literal["quick", "long", "joint"] | None = None
-    """quick: under five minutes on two cores, to see it learn; full: within the hour; joint: one estimator for many
-    categories, with any parts. By default the recipe's, else quick."""
+    preset: Literal["quick", "long", "joint", "own"] | None = None
+    """quick: under five minutes on two cores, to see it learn; long: within the hour; joint: one estimator for many
+    categories, with any parts; own: a category of your objects. By default the recipe's, with --name own, else
+    quick."""
     recipe: str | None = None
     """A recipe that comes with the package, by the name of its estimator, or a JSON file. With a preset, the run is as
     long as that preset's. A finished run is unchanged."""
     out: Path | None = None
-    """Folder of the run; by default out/train/CATEGORY-PRESET."""
+    """Folder of the run; by default out/train/NAME, or out/train/CATEGORY-PRESET."""
     workers: int = 1
     """Processes that make clouds while the network learns, and estimates that boxes learn from; the result does not
     depend on it."""
@@ -72,11 +79,14 @@ class Train:
     categories: Annotated[tuple[str, ...] | None, tyro.conf.arg(name="category")] = None
     """Procedural categories, or 'all'; several share one estimator, and one named twice is seen twice as often. By
     default laptop."""
-    files: tuple[Path, ...] | None = None
-    """Learn from these objects instead: URDF files, object folders, or folders of them. They are tested in other states
-    and from other sides; for objects that were not learnt from use artperl evaluate --files."""
+    objects: tuple[Path, ...] | None = None
+    """Learn from these objects instead: URDF files, object folders, or folders of them. Without --name they are tested,
+    too, in other states and from other sides."""
+    name: str | None = None
+    """Learn the category that these objects are of: two fifths of them are held out, to choose the best estimator and
+    to test it. OUT/split.json says which."""
     package_roots: Annotated[PackageRoots, tyro.conf.arg(name="package-root")] = field(default_factory=dict)
-    """Folders that package:// names of these files stand for, where they are not found as they are; repeatable."""
+    """Folders that package:// names of their files stand for, where they are not found as they are; repeatable."""
     parts: Literal["artimage", "any"] | None = None
     """artimage: objects with the parts that their category has in ArtImage or ReArtMix, such as body and three drawers;
     any: all objects of the families."""
@@ -128,9 +138,9 @@ class Train:
         recipe = None if self.recipe is None else Recipe.read(self.recipe)
         options = self._options(recipe)
         preset = self.preset or (recipe.preset if recipe else "quick")
-        name = recipe.name if recipe else "-".join(self.categories or ()) or Path((*options.files, "laptop")[0]).stem
+        name = recipe.name if recipe else "-".join(self.categories or ()) or Path((*options.objects, "laptop")[0]).stem
         method = "" if options.method == "full" else f"{options.method}-"
-        out = self.out or Path("out/train") / f"{name}-{method}{preset}"
+        out = self.out or RUNS / (options.name or f"{name}-{method}{preset}")
         if recipe is None or not is_made(out, recipe):
             try:
                 training = Training(options, out, self.workers, recipe=recipe, device=self.device)
@@ -170,15 +180,29 @@ class Train:
                     f"the recipe says that itself: {', '.join(changes)}", "recipe", "give no other options with it"
                 )
             return recipe.train_options(self.preset)
-        preset = preset_of(self.method or "full", self.preset or "quick")
-        if self.files:
+        preset = preset_of(self.method or "full", self.preset or ("own" if self.name else "quick"))
+        if self.name is not None:
+            _check_name(self.name, self.objects)
+        if self.objects:
             if self.categories or self.real or self.parts == "artimage":
-                raise ConfigError("files are learnt from alone, with all of their parts", "files", "give no --category")
+                raise ConfigError(
+                    "given objects are learnt from alone, with all of their parts", "objects", "give no --category"
+                )
             views = max(preset.test_objects, _FILE_VIEWS)
             changes |= {"categories": [], "parts": "any", "test_objects": views}
         elif self.categories == ("all",):
             changes["categories"] = list(FAMILIES)
         return changed(preset, changes)
+
+
+def _check_name(name: str, objects: tuple[Path, ...] | None) -> None:
+    """Refuse a name that is not one of a folder, or is that of an estimator of the package."""
+    if not objects:
+        raise ConfigError("there are no objects to name", "--name", "say which: --objects my_urdfs/")
+    if safe_name(name) != name:
+        raise ConfigError(f"{name!r:.80} is no name", "--name", f"use letters, digits, - and _: {safe_name(name)}")
+    if (WEIGHTS / name).is_dir():
+        raise ConfigError(f"{name} comes with the package", "--name", f"use another name, such as my_{name}")
 
 
 def _open_wandb(project: str, out: Path, options: dict[str, Any]) -> None:

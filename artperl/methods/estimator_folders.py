@@ -10,6 +10,9 @@ from artsim.errors import DatasetError
 WEIGHTS = Path(__file__).parents[1] / "weights"
 """Folder of the estimators that come with the package."""
 
+RUNS = Path("out/train")
+"""Where training runs are, each in a folder of its name, unless they are told otherwise."""
+
 FORMAT = 4
 SETTINGS, TENSORS, BASE = "estimator.json", "weights.safetensors", "base.npz"
 """Files of the folder."""
@@ -17,9 +20,15 @@ AGAIN = "train it again"
 
 
 def folder_of(name: str | Path, method: str = "full") -> Path:
-    """Folder of an estimator. One that comes with the package is not hidden by a folder of that name without any."""
+    """Folder of an estimator: of its own, of the package by its name, or the best one of a run, by its folder or name.
+
+    One that comes with the package is not hidden by a folder of that name without any.
+    """
     own, shipped = Path(name), WEIGHTS / ("" if method == "full" else method) / _FORMER_ESTIMATORS.get(str(name), name)
-    return shipped if shipped.is_dir() and not (own / SETTINGS).is_file() else own
+    if shipped.is_dir() and not (own / SETTINGS).is_file():
+        return shipped
+    places = (own, own / "best", RUNS / name / "best")
+    return next((place for place in places if (place / SETTINGS).is_file()), own)
 
 
 _FORMER_ESTIMATORS = {"any": "generic"}

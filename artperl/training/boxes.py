@@ -109,7 +109,7 @@ def _choose(context: Context, best: Estimator, learner: Estimator, boxes: Boxes)
     views = context.options.validation_views
     validation = unseen_samples(context, views, VALIDATION_SEEDS)
     if context.objects.mixed:
-        validation += given_samples(context, len(validation), VALIDATION_SEEDS)
+        validation += given_samples(context, context.objects.given.train, len(validation), VALIDATION_SEEDS)
     noisy = []
     if _sees_noise(context):
         noisy = unseen_samples(context, -(-views // _NOISY_EVERY), VALIDATION_SEEDS, SENSORS[0])

@@ -225,7 +225,7 @@ def training_options(options: ComparisonOptions, category: str, method: StoredMe
     else:
         arm = options.arm or str(arm_folder(out))
         preset = PRESETS["joint"] if method == "full" else preset_of(method, options.preset)
-        own = replace(preset, categories=(), files=(arm,), parts="any", noisy=_NOISY, degraded=_DEGRADED)
+        own = replace(preset, categories=(), objects=(arm,), parts="any", noisy=_NOISY, degraded=_DEGRADED)
         if method == "full" and options.minutes is None:
             own = replace(own, start_from="generic", perception_steps=_ARM_STEPS)
     # The report tests each estimator itself. Stages that a method does not have stay without steps.

@@ -15,6 +15,7 @@ from artperl.training.steps import one_cycle
 from artsim.common.json_records import from_json_values
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
+from artsim.model.draws import StateOptions, ViewOptions
 
 T = TypeVar("T")
 LENGTHS = (
@@ -52,11 +53,14 @@ class TrainOptions:
     any: all objects of the families."""
     max_parts: int | None = None
     """The most parts that an object may have."""
-    files: tuple[str, ...] = ()
+    objects: tuple[str, ...] = ()
     """URDF files, object folders, or folders of them: objects to learn from instead of categories, which are empty
     then."""
+    name: str | None = None
+    """Of the category that these objects are of: some of them are held out. Without a name the objects themselves are
+    learnt."""
     package_roots: tuple[tuple[str, str], ...] = ()
-    """Name and folder of the packages that these files name, where they are not found as they are."""
+    """Name and folder of the packages that their files name, where they are not found as they are."""
     real: bool = False
     """Every other object is a real one, of the half of ArtImage's frozen split that is not for testing."""
     dataset: str | None = None
@@ -123,7 +127,7 @@ class TrainOptions:
     patience: int = 0
     """Validations in a row without a gain after which a stage ends; 0 never ends one early."""
     test_objects: int = 40
-    """Unseen objects of each category, others for validation than for the test at the end; files share so many."""
+    """Unseen objects of each category, others for validation than for the test at the end; given ones share so many."""
     foreign_categories: int = 12
     """Other categories, of which two objects each show what confidence must be low for."""
     validation_views: int = 4
@@ -146,7 +150,7 @@ class TrainOptions:
                 raise ConfigError(f"{getattr(self, name)} is no learning rate", name, "use 1e-4 to 1e-2")
         if self.noisy and (self.dataset is not None or self.sample.noise != "none"):
             raise ConfigError("clouds that have their noise get no other", "noisy", "use one of noise, dataset, noisy")
-        if self.dataset is not None and (self.real or self.files):
+        if self.dataset is not None and (self.real or self.objects):
             raise ConfigError("a dataset is not mixed with other objects", "dataset", "generate one with them in it")
         if self.method not in _WITH_AGENT and (self.agent_rollouts or self.retrieval_steps):
             raise ConfigError(
@@ -159,8 +163,8 @@ class TrainOptions:
             raise ConfigError(
                 "the method omad learns from whole objects", "stretched, degraded", "leave them out, or use --noisy"
             )
-        if not self.categories and not self.files:
-            raise ConfigError("there is nothing to learn from", "categories", "name categories or files")
+        if not self.categories and not self.objects:
+            raise ConfigError("there is nothing to learn from", "categories", "name categories or objects")
 
     def phase(self, rollout: int) -> Phase:
         """The phase of Algorithm 1 that a rollout is in: cloning on states of either kind in turn, then both losses."""
@@ -181,8 +185,8 @@ class TrainOptions:
 
     @property
     def votes(self) -> bool:
-        """Whether perception finds parts by votes: of families' objects with any parts, nobody knows how many."""
-        return self.parts == "any" and not self.files
+        """Whether perception finds parts by votes: of a category's objects with any parts, nobody knows how many."""
+        return self.parts == "any" and (not self.objects or self.name is not None)
 
 
 def changed(options: T, changes: Mapping[str, Any]) -> T:
@@ -228,9 +232,16 @@ PRESETS = {
         parts="any", max_parts=10, base_objects=16, reference_points=64, width=40, perception_steps=9000,
         dense_steps=0, denser=1, box_views=0, box_width=40, validate_every=2000, test_objects=8, validation_views=2,
     ),
+    "own": TrainOptions(
+        parts="any", max_parts=10, reference_points=64, width=40, start_from="generic", perception_rate=1e-3,
+        perception_steps=800, dense_steps=0, stretched=0.3, noisy=0.25, degraded=0.6, box_views=0, box_width=40,
+        validate_every=400, validation_views=2,
+        sample=SampleOptions(states=StateOptions("mixed"), views=ViewOptions(preset="mixed")),
+    ),
 }  # fmt: skip
 """quick: one category in a few minutes on two cores, to see it learn; long: one category within the hour; joint:
-one estimator for many categories, with any parts."""
+one estimator for many categories, with any parts; own: a category of a few given objects, from the estimator generic,
+whose sizes and clouds these are."""
 
 PAPER_PRESETS = {
     "quick": TrainOptions(

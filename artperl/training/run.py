@@ -123,6 +123,7 @@ class Training:
             return context.ranks.same({})
         with context.folder.held():
             context.state.load(context.folder, context.options)  # another process may have trained here meanwhile
+            context.objects.given.freeze(self.out / "split.json")
             context.ranks.same(None)
             with context.folder.curves() as board, context.stop:
 

@@ -72,10 +72,14 @@ def _full_networks(options: TrainOptions, num_rows: int) -> dict[str, nn.Module]
 
 
 def _full_stages(options: TrainOptions) -> list[Stage]:
-    """Perception on clouds of few points, then on denser ones, fewer at a time; boxes; the confidence."""
+    """Perception on clouds of few points, then on denser ones, fewer at a time; boxes; the confidence.
+
+    Another estimator that it starts from is the first that is validated, and stays where nothing better is learnt.
+    """
     learn = partial(SupervisedStage, network="perception", loss=perception_loss, validated=True)
     dense = learn("dense", steps="dense_steps", dense=True)
-    return [learn("perception"), dense, Validation(), BoxStage(), Calibration()]
+    start = [] if options.start_from is None else [Validation("start")]
+    return [*start, learn("perception"), dense, Validation(), BoxStage(), Calibration()]
 
 
 def _full_estimator(context: Context) -> Estimator:

@@ -28,6 +28,7 @@ from artsim.common.files import write_atomic
 from artsim.common.progress import say
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ArtsimError
+from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
 
 _AS_GOOD = 1.01
@@ -36,7 +37,7 @@ _AS_GOOD = 1.01
 
 @dataclass(frozen=True)
 class Validation:
-    """Validates the estimator of a run that has no other stage to learn in."""
+    """Validates the estimator of a run that has not been validated: before it learns, or where nothing is learnt."""
 
     name: str = "validation"
     lengths: ClassVar[dict[str, str]] = {}
@@ -173,7 +174,7 @@ def test(context: Context) -> dict[str, Any]:
 
 
 def unseen_samples(context: Context, views: int, first_seed: int, noise: str | None = None) -> list[Sample]:
-    """Frozen samples of objects that nothing was learnt from; of files, other states and views of the same objects.
+    """Frozen samples of objects that nothing was learnt from; where none are held out, other states and views of them.
 
     Parameters
     ----------
@@ -186,17 +187,20 @@ def unseen_samples(context: Context, views: int, first_seed: int, noise: str | N
     """
     options = context.options
     if not options.categories:
-        return given_samples(context, options.test_objects * views, first_seed, noise)
+        given = context.objects.given
+        objects = given.test if first_seed == TEST_SEEDS else given.val
+        return given_samples(context, objects, options.test_objects * views, first_seed, noise)
     return frozen_samples(
         options.categories, options.test_objects, views, _as_tested(context, noise), first_seed, options.parts,
         options.max_parts,
     )  # fmt: skip
 
 
-def given_samples(context: Context, views: int, first_seed: int, noise: str | None = None) -> list[Sample]:
-    """At least so many views of the given objects, of each as many."""
-    given = context.objects.given
-    return samples_of(given, -(-views // len(given)), _as_tested(context, noise), first_seed)
+def given_samples(
+    context: Context, objects: Sequence[ArticulatedObject], views: int, first_seed: int, noise: str | None = None
+) -> list[Sample]:
+    """At least so many views of some objects, of each as many."""
+    return samples_of(objects, -(-views // len(objects)), _as_tested(context, noise), first_seed)
 
 
 def _as_tested(context: Context, noise: str | None) -> SampleOptions:

@@ -1,12 +1,12 @@
 """Rest frames of families and of real objects side by side: extents, the root, and where joints point.
 
-Everything is measured on the objects themselves: nothing here says what a frame should be.
+Everything is measured on the objects themselves: nothing but :func:`doubts` says what a frame should be.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +26,13 @@ _EXTENT = 0.2
 """Difference of medians, in diagonals: an exchange of two axes shows in families that are not as long as wide."""
 _MAIN = 0.5
 """Share of the boxes from which a root is the body of the object."""
+
+_CLEAR = 0.9
+"""Cosine from which parts open along an axis of the frame: those of real furniture have 0.96 and more."""
+_SIZES = (0.01, 20.0)
+"""Metres between which diagonals of things are; PartNet-Mobility's are 1.4 to 3."""
+_OTHER_UNIT = 20.0
+"""Times that an object of the same kind is as large: inches and centimetres differ from metres by 40 and 100."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,3 +128,67 @@ def differences(family: Frame, real: Frame) -> list[str]:
             if other > ours.get(sign, 0.0):
                 found.append(f"{kind}: real ones towards {sign}, the family's the other way")
     return found
+
+
+def opening(obj: ArticulatedObject) -> str:
+    """Where the moving parts of an object first go as they open, such as "-x", in the rest frame.
+
+    Parts count by the area of their boxes' largest faces: doors, not knobs. Empty where they go to no side.
+    """
+    tree, total = obj.tree, np.zeros(3)
+    for k, joint in enumerate(tree.joints[1:], start=1):
+        lower, upper = tree.limits[k]
+        sign = 1.0 if np.isinf(upper) or upper - joint.rest >= joint.rest - lower else -1.0
+        axis, arm = np.asarray(joint.axis), obj.box_center[k] - np.asarray(joint.origin)
+        moves = axis if joint.type == "prismatic" else np.cross(axis, arm)
+        size, length = np.sort(obj.box_size[k]), float(np.linalg.norm(moves))
+        if upper > lower and length > 0.0:
+            total += sign * size[1] * size[2] / length * moves
+    k = int(np.abs(total).argmax())
+    return f"{'-' if total[k] < 0 else '+'}{'xyz'[k]}" if abs(total[k]) > _CLEAR * np.linalg.norm(total) else ""
+
+
+def doubts(objects: Sequence[ArticulatedObject], names: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """What looks wrong with the frames, units and joints of objects that are of one category.
+
+    Yields
+    ------
+    name, what : str
+        Of the object, or "all"; and what is wrong, with its fix.
+    """
+    sides = [opening(obj) for obj in objects]
+    usual, count = Counter(side for side in sides if side).most_common(1)[0] if any(sides) else ("", 0)
+    if usual == "+x":
+        yield "all", f"{count} of {len(objects)} open towards +X, and fronts are to be towards -X. {_turn(np.pi)}"
+    middle = float(np.median([obj.diagonal for obj in objects]))
+    for obj, name, side in zip(objects, names, sides, strict=True):
+        times = obj.diagonal / middle
+        if not _SIZES[0] < obj.diagonal < _SIZES[1] or not 1.0 / _OTHER_UNIT < times < _OTHER_UNIT:
+            yield (
+                name,
+                (
+                    f"it is {obj.diagonal:.3g} m across, and the object in the middle {middle:.3g} m. "
+                    'Fix: metres; of meshes in millimetres, scale="0.001 0.001 0.001"'
+                ),
+            )
+        spans = np.ptp(obj.tree.limits, axis=1)
+        if not (spans > 0).any():
+            yield name, "nothing moves. Fix: joints with limits, lower below upper"
+        for joint, span in zip(obj.tree.joints, spans, strict=True):
+            if joint.type == "revolute" and np.isfinite(span) and span > 2.0 * np.pi + 0.01:
+                yield name, f"joint {joint.name!r} turns by {span:.4g} rad. Fix: limits in radians, degrees / 57.2958"
+        if side and side != usual and 2 * count > len(objects):
+            yield (
+                name,
+                f"its parts open towards {side.upper()}, those of most towards {usual.upper()}. "
+                + ("Fix: stand it upright" if "z" in side + usual else _turn(_yaw(usual) - _yaw(side))),
+            )
+
+
+def _yaw(side: str) -> float:
+    """Radians about Z from +x."""
+    return {"+x": 0.0, "+y": 0.5 * np.pi, "-x": np.pi, "-y": 1.5 * np.pi}[side]
+
+
+def _turn(yaw: float) -> str:
+    return f'Fix: a fixed joint above the root link, with <origin rpy="0 0 {yaw % (2.0 * np.pi):.4f}"/>'

@@ -213,9 +213,9 @@ def test_a_run_that_learns_nothing_calibrates_what_it_begins_with(tmp_path: Path
 
 def test_no_object_is_the_reference_of_itself_while_boxes_are_learnt(tmp_path: Path) -> None:
     """Given objects are in the base; in use, those that are seen will not be."""
-    options = replace(STAGE, box_views=2, files=("urdf_assets/laptop",))
+    options = replace(STAGE, box_views=2, objects=("urdf_assets/laptop",))
     training = Training(options, tmp_path, workers=0, progress=False)
-    (own,) = training.context.objects.given
+    (own,) = training.context.objects.given.train
     training.run()
     best = load_estimator(tmp_path / "best")
     learner = best_without_own_references(best, training.context)

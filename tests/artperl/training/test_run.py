@@ -144,7 +144,7 @@ def test_families_with_any_parts_are_learnt_by_votes_and_learnt_on_by_number(tmp
     assert learnt.votes
     save_estimator(replace(best, boxes=Boxes(learnt.num_rows, 8)), tmp_path / "any" / "best", {})
     files = replace(
-        options, categories=(), files=("urdf_assets/cabinet/mobility.urdf",), max_parts=learnt.num_rows,
+        options, categories=(), objects=("urdf_assets/cabinet/mobility.urdf",), max_parts=learnt.num_rows,
         start_from=str(tmp_path / "any" / "best"),
     )  # fmt: skip
     training = Training(files, tmp_path / "files", workers=0, progress=False)
@@ -263,7 +263,7 @@ def test_objects_of_files_are_learnt_from_and_tested_on(
 ) -> None:
     """Without categories: one estimator for exactly these objects, with rows for parts to spare for larger ones."""
     urdf = Path("urdf_assets/cabinet/mobility.urdf")
-    options = replace(TINY, categories=(), files=(str(urdf),), parts="any", max_parts=6)
+    options = replace(TINY, categories=(), objects=(str(urdf),), parts="any", max_parts=6)
     training = Training(options, tmp_path, workers=0, progress=False)
     objects = training.context.objects
     assert (len(objects.base), training.context.estimator().perception.num_rows) == (1, 6)
@@ -272,10 +272,11 @@ def test_objects_of_files_are_learnt_from_and_tested_on(
     ((category, figure),) = figures.items()
     assert category == load(urdf).category
     assert len(figure["parts"]) == len(load(urdf))
-    samples = Given(objects.given, SampleOptions(num_points=64), 5, 2, 6)
+    given, seen = objects.given.train, SampleOptions(num_points=64)
+    samples = Given(given, seen, 5, 2, 6)
     states = [samples[i].joint_state for i in range(3)]
     assert not np.array_equal(states[0], states[1])
-    np.testing.assert_array_equal(states[0], Given(objects.given, SampleOptions(num_points=64), 5, 2, 6)[0].joint_state)
+    np.testing.assert_array_equal(states[0], Given(given, seen, 5, 2, 6)[0].joint_state)
     with pytest.raises(ConfigError, match="more than 2"):
         Training(replace(options, max_parts=2), tmp_path / "few", workers=0, progress=False)
     # What it was learnt from is no family, so that a test needs to be told its objects.
@@ -283,10 +284,12 @@ def test_objects_of_files_are_learnt_from_and_tested_on(
         verbs.Evaluate(tmp_path / "best").run()
     verbs.Evaluate(tmp_path / "best", files=(urdf,), views=2).run()
     assert figure["part_names"][0] in capsys.readouterr().out
-    monkeypatch.setattr("sys.argv", ["train.py", "--files", str(urdf), "--category", "laptop", "--out", str(tmp_path)])
+    monkeypatch.setattr(
+        "sys.argv", ["train.py", "--objects", str(urdf), "--category", "laptop", "--out", str(tmp_path)]
+    )
     with pytest.raises(SystemExit):
         verbs.train_main()
-    assert "files are learnt from alone" in capsys.readouterr().err
+    assert "given objects are learnt from alone" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
