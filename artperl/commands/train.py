@@ -200,7 +200,7 @@ def _check_name(name: str, objects: tuple[Path, ...] | None) -> None:
     if not objects:
         raise ConfigError("there are no objects to name", "--name", "say which: --objects my_urdfs/")
     if safe_name(name) != name:
-        raise ConfigError(f"{name!r:.80} is no name", "--name", f"use letters, digits, - and _: {safe_name(name)}")
+        raise ConfigError(f"{name!r:.80} is no name", "--name", "use letters, digits, - and _")
     if (WEIGHTS / name).is_dir():
         raise ConfigError(f"{name} comes with the package", "--name", f"use another name, such as my_{name}")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -56,8 +57,8 @@ class Split:
         if (different := len({obj.sha256 for obj in objects})) < _LEAST:
             raise ConfigError(
                 f"{different} different objects are too few to hold some out for a test", name,
-                f"make variations, artsim vary {sources[0].path} --count 20 --out varied, and add --objects varied; or "
-                "leave out --name, to learn these very objects",
+                f"artsim vary {shlex.quote(str(sources[0].path))} --count 20 --out varied, and add varied to --objects;"
+                " or leave out --name, to learn these very objects",
             )  # fmt: skip
         drawn = assign_splits([(name, obj.sha256) for obj in objects], _SHARES, 0)
         own = {split: [obj for obj, to in zip(objects, drawn, strict=True) if to == split] for split in SPLITS}

@@ -177,7 +177,7 @@ def doubts(objects: Sequence[ArticulatedObject], names: Sequence[str]) -> Iterat
         for joint, span in zip(obj.tree.joints, spans, strict=True):
             if joint.type == "revolute" and np.isfinite(span) and span > 2.0 * np.pi + 0.01:
                 yield name, f"joint {joint.name!r} turns by {span:.4g} rad. Fix: limits in radians, degrees / 57.2958"
-        if side and side != usual and 2 * count > len(objects):
+        if usual != "+x" and side not in ("", usual) and 2 * count > len(objects):
             yield (
                 name,
                 f"its parts open towards {side.upper()}, those of most towards {usual.upper()}. "
