@@ -6,7 +6,7 @@ leaves a gap between parts in every joint state. ``CONTRIBUTING.md`` shows how t
 """
 
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from importlib import import_module
 
@@ -25,81 +25,22 @@ from artsim.model.params import Params, Value
 Family = Callable[[Draws], Assembly]
 
 CATEGORIES = (
-    "bottle",
-    "box",
-    "bucket",
-    "camera",
-    "cart",
-    "chair",
-    "clock",
-    "coffee_machine",
-    "cutter",
-    "dishwasher",
-    "dispenser",
-    "display",
-    "door",
-    "drawer",
-    "eyeglasses",
-    "fan",
-    "faucet",
-    "folding_chair",
-    "folding_knife",
-    "globe",
-    "kettle",
-    "keyboard",
-    "kitchen_pot",
-    "lamp",
-    "laptop",
-    "lighter",
-    "microwave",
-    "mouse",
-    "oven",
-    "pen",
-    "phone",
-    "pliers",
-    "printer",
-    "random_tree",
-    "refrigerator",
-    "remote",
-    "robot_arm",
-    "safe",
-    "scissors",
-    "stapler",
-    "storage_furniture",
-    "suitcase",
-    "switch",
-    "table",
-    "toaster",
-    "toilet",
-    "trash_can",
-    "usb",
-    "valve",
-    "washing_machine",
-    "window",
-)
+    "bottle", "box", "bucket", "camera", "cart", "chair", "clock", "coffee_machine", "cutter", "dishwasher",
+    "dispenser", "display", "door", "drawer", "eyeglasses", "fan", "faucet", "folding_chair", "folding_knife", "globe",
+    "kettle", "keyboard", "kitchen_pot", "lamp", "laptop", "lighter", "microwave", "mouse", "oven", "pen", "phone",
+    "pliers", "printer", "random_tree", "refrigerator", "remote", "robot_arm", "safe", "scissors", "stapler",
+    "storage_furniture", "suitcase", "switch", "table", "toaster", "toilet", "trash_can", "usb", "valve",
+    "washing_machine", "window",
+)  # fmt: skip
 """The registry: each category's name is that of its module."""
 
 
-class _Registry(Mapping[str, Family]):
-    """Families by category; the module of one is imported when it is first asked for."""
-
-    def __getitem__(self, category: str) -> Family:
-        if category not in self:
-            raise KeyError(category)
-        family: Family = import_module(f"artsim.families.{category}").build
-        return family
-
-    def __contains__(self, category: object) -> bool:
-        return category in CATEGORIES
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(CATEGORIES)
-
-    def __len__(self) -> int:
-        return len(CATEGORIES)
+def _family(category: str) -> Family:
+    """A category's ``build``; its module is imported when it is first called."""
+    return lambda draws: import_module(f"artsim.families.{category}").build(draws)
 
 
-FAMILIES: Mapping[str, Family] = _Registry()
+FAMILIES: Mapping[str, Family] = {category: _family(category) for category in CATEGORIES}
 """Every category that :func:`make` knows."""
 
 _NAMED_OTHERWISE = ("cutter", "drawer", "folding_knife", "random_tree", "robot_arm", "usb", "valve")

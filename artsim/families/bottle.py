@@ -22,8 +22,6 @@ from artsim.making.solids import Solid, box, ellipsoid, hull_of, ring, rod, tube
 DENSITY = 300.0  # kg/m^3, as the pieces are solid and real ones are hollow
 SHAPES = {"wine": 0.1, "beer": 0.08, "water": 0.12, "shampoo": 0.16, "cone": 0.08, "ball": 0.07, "jar": 0.12,
           "flask": 0.1, "tube": 0.09, "waist": 0.08}  # fmt: skip
-CLOSURES = {"screw_cap": 0.34, "pump": 0.15, "flip_top": 0.16, "stopper": 0.12, "sprayer": 0.09, "cup": 0.07,
-            "bail": 0.07}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -42,13 +40,14 @@ class Mouth:
 
 def build(draws: Draws) -> Assembly:
     """A bottle, closed at rest; nozzles, triggers and the free edge of flip tops are at -X, handles at +X."""
-    closure = draws.pick("closure", CLOSURES)
+    closures = {"screw_cap": _screw_cap, "pump": _pump, "flip_top": _flip_top, "stopper": _stopper,
+                "sprayer": _sprayer, "cup": _cup, "bail": _bail}  # fmt: skip
+    close = draws.one_of("closure", closures, (0.34, 0.15, 0.16, 0.12, 0.09, 0.07, 0.07))
     shape = draws.pick("shape", SHAPES)
-    wide_mouth = shape == "jar" and closure not in ("pump", "sprayer")
-    body, mouth = _body(draws, shape, wide_mouth, 0.022 if closure in ("pump", "sprayer", "bail") else 0.012)
+    wide_mouth = shape == "jar" and close not in (_pump, _sprayer)
+    body, mouth = _body(draws, shape, wide_mouth, 0.022 if close in (_pump, _sprayer, _bail) else 0.012)
     bottle = Assembly("body", body, DENSITY)
-    makers = (_screw_cap, _pump, _flip_top, _stopper, _sprayer, _cup, _bail)
-    dict(zip(CLOSURES, makers, strict=True))[closure](draws, bottle, mouth)
+    close(draws, bottle, mouth)
     return bottle
 
 
@@ -81,8 +80,7 @@ def _body(draws: Draws, shape: str, wide: bool, tall: float) -> tuple[Solid, Mou
     plain = shape in ("shampoo", "water", "waist", "jar", "tube") and not wide
     shift = 0.0
     if plain and draws.chance("neck_aside", 0.2):  # a can
-        shift = {"back": -1.0, "front": 1.0}[draws.pick("neck_at", ["back", "front"])]
-        shift *= draws.number("neck_shift", (0.2, 0.8))
+        shift = draws.one_of("neck_at", {"back": -1.0, "front": 1.0}) * draws.number("neck_shift", (0.2, 0.8))
         shift *= max(depth - 1.2 * radius, 0.0)
     body = moulded(_bevelled(levels), outline, shift)
     wall = radius * draws.number("neck_wall", (0.12, 0.25))
@@ -172,7 +170,7 @@ def _cover(draws: Draws, mouth: Mouth, bore: float = 0.0) -> tuple[Solid, float,
     sections = draws.pick("cap_sides", [24, 24, 8, 16])
     inside = (mouth.radius * 1.02 + GAP) / cos(np.pi / sections)
     wall = draws.number("cap_wall", (0.1, 0.35))
-    wall = max((0.1 if draws.pick("cap", ["thin", "thick"]) == "thin" else wall) * mouth.radius, 0.0016)
+    wall = max(draws.one_of("cap", {"thin": 0.1, "thick": wall}) * mouth.radius, 0.0016)
     upper = inside + wall
     radius = upper * (draws.number("cap_flare", (1.0, 1.2)) if draws.chance("cap_flared", 0.4) else 1.0)
     low, high = mouth.foot + GAP, mouth.rim + GAP + wall
@@ -248,7 +246,7 @@ def _flip_top(draws: Draws, bottle: Assembly, mouth: Mouth) -> None:
     if tall > 0.35 * radius:
         collar += rod(0, 0, (high - 0.0005, high + 0.4 * tall), 0.5 * spout, 0.35 * spout, 14)
     # Beyond 90 degrees the lid's back dips beside the collar, above the shoulder.
-    limit = np.deg2rad(draws.degrees("lid_angle", (80, 135 if tall < 0.6 * (high - low) else 95)))
+    limit = draws.turn("lid_angle", (80, 135 if tall < 0.6 * (high - low) else 95))
     turning = draws.chance("collar", 0.35)
     if turning:
         bottle.add("collar", collar, _closing(draws, mouth, high - low))
@@ -347,7 +345,7 @@ def _bail(draws: Draws, bottle: Assembly, mouth: Mouth) -> None:
     for s in (-1.0, 1.0):
         y = s * (half + 0.0006 + 0.8 * r)
         bottle.body += tube([(0.9 * mouth.radius, y, low), (x, y, low), (x, y, z)], 0.7 * r, 8)
-    limit = np.deg2rad(draws.degrees("lid_angle", (80, 110)))
+    limit = draws.turn("lid_angle", (80, 110))
     bottle.add("lid", lid, revolute("body", SIDE, (x, 0, z), 0.0, limit))
     wire = 0.5 * r
     drop = low - mouth.foot - 2.5 * wire
@@ -356,5 +354,5 @@ def _bail(draws: Draws, bottle: Assembly, mouth: Mouth) -> None:
         wide = 0.5 * mouth.radius
         path = [(out, -wide, low), (out, -0.8 * wide, low - drop), (out, 0.8 * wide, low - drop), (out, wide, low)]
         bow = tube(path, wire, 8) + tube([path[0], path[-1]], wire, 8)
-        limit = np.deg2rad(draws.degrees("latch_angle", (60, 120)))
+        limit = draws.turn("latch_angle", (60, 120))
         bottle.add("latch", bow, revolute("body", SIDE, (out, 0, low), 0.0, limit))

@@ -25,18 +25,15 @@ def build(draws: Draws) -> Assembly:
 
 def _rigid(draws: Draws) -> Assembly:
     """Chest, case or jewellery box; its hinge lies behind the back, so that the lid clears it in every state."""
-    small, large = draws.length("width", (0.12, 0.35)), draws.length("large_width", (0.4, 1.3))
-    width = small if draws.pick("scale", ["small", "large"]) == "small" else large
-    depth = width * draws.number("depth", (0.42, 0.8))
-    height = width * draws.number("height", (0.18, 0.6))
+    widths = {"small": draws.length("width", (0.12, 0.35)), "large": draws.length("large_width", (0.4, 1.3))}
+    width = draws.one_of("scale", widths)
+    depth, height = width * draws.number("depth", (0.42, 0.8)), width * draws.number("height", (0.18, 0.6))
     if draws.chance("unusual", 0.35):
         depth, width, height = unusual_sides(draws, LEAST_SHARES, MOST_SHARES, (0.07, 0.1, 0.05))
     wall = max(0.003, width * draws.number("wall", (0.012, 0.035)))
     x, y = depth / 2, width / 2
-    radius = draws.number("corner_radius", (0.02, 0.1)) * depth
-    radius *= draws.pick("corners", ["square", "round"]) == "round"
-    band = wall * draws.number("band_thickness", (0.3, 0.6))
-    band *= draws.pick("edges", ["plain", "banded"]) == "banded"
+    radius = draws.one_of("corners", {"square": 0.0, "round": draws.number("corner_radius", (0.02, 0.1)) * depth})
+    band = draws.one_of("edges", {"plain": 0.0, "banded": wall * draws.number("band_thickness", (0.3, 0.6))})
     seam = height + GAP
 
     body = _rigid_body(draws, x, y, height, wall, radius)
@@ -52,7 +49,7 @@ def _rigid(draws: Draws) -> Assembly:
     chest = Assembly("body", body, 700.0)
     if draws.chance("two_lids", 0.12) and radius == 0.0:  # hinged at the left and the right
         chest.record(handles=True)
-        limit = np.deg2rad(draws.degrees("lid_angle", (80.0, 175.0)))
+        limit = draws.turn("lid_angle", (80.0, 175.0))
         thick = wall * draws.number("lid_thickness", (0.6, 1.2))
         for number, (sign, axis) in enumerate(((1, (-1, 0, 0)), (-1, (1, 0, 0)))):
             lid = box(x, (sign * y, sign * GAP), (seam, seam + thick))
@@ -78,8 +75,8 @@ def _rigid(draws: Draws) -> Assembly:
     for first, last in spans:
         lid += rod(axis_x, (first * y, last * y), seam, barrel, sections=12)
         lid += box((x - wall, axis_x), (first * y, last * y), (seam + 0.0003, seam + 0.9 * barrel))
-    usual, wide = draws.degrees("lid_angle", (75.0, 115.0)), draws.degrees("wide_lid_angle", (115.0, 170.0))
-    limit = np.deg2rad(usual if draws.pick("lid_opens", ["usually", "wide"]) == "usually" else wide)
+    angles = {"usually": draws.turn("lid_angle", (75.0, 115.0)), "wide": draws.turn("wide_lid_angle", (115.0, 170.0))}
+    limit = draws.one_of("lid_opens", angles)
     chest.add("lid", lid, revolute("body", (0, 1, 0), (axis_x, 0, seam), 0.0, limit))
     if top - seam > 0.02 and draws.chance("latch", 0.2):
         _latches(draws, chest, max(x + band, -float(lid.bounds()[0, 0])), y, seam, top)
@@ -89,7 +86,7 @@ def _rigid(draws: Draws) -> Assembly:
 def _rigid_body(draws: Draws, x: float, y: float, height: float, wall: float, radius: float) -> Solid:
     if radius == 0.0:
         return tray((-x, -y, 0), (x, y, height), wall)
-    bevel = 0.4 * radius if draws.pick("bottom_edge", ["sharp", "bevelled"]) == "bevelled" else 0.0
+    bevel = draws.one_of("bottom_edge", {"sharp": 0.0, "bevelled": 0.4 * radius})
     profile = [(0.0, bevel), (bevel / height, 0.0), (1.0, 0.0)] if bevel > 0 else [(0.0, 0.0), (1.0, 0.0)]
     return rounded_tray((-x, -y, 0), (x, y, height), wall, radius, profile, floor=wall + bevel)
 
@@ -102,7 +99,7 @@ def _bands(draws: Draws, x: float, y: float, low: float, high: float, band: floa
     for z0, z1 in ((low, low + 1.5 * wall), (high - 1.5 * wall, high))[: draws.integer("bands", 1, 2)]:
         solid += frame((-x - band, -y - band, z0), (x + band, y + band, z1), [0.8 * wall + band] * 4, 0, 1)
     if draws.chance("strap", 0.6):
-        for share in {2: (-0.6, 0.6), 3: (-0.7, 0.0, 0.7)}[draws.pick("straps", [2, 3])]:
+        for share in draws.one_of("straps", {2: (-0.6, 0.6), 3: (-0.7, 0.0, 0.7)}):
             for side in (-x - band, x - 0.8 * wall):
                 across = about(share * (y - (wall + radius)), 0.7 * wall)
                 solid += box((side, side + band + 0.8 * wall), across, (low, high))
@@ -145,8 +142,8 @@ def _lid(
     kind = draws.pick("lid", {"flat": 0.35, "hollow": 0.45, "dome": 0.2})
     if kind == "flat":
         thick = wall * draws.number("lid_thickness", (0.7, 1.5))
-        over = draws.number("lid_overhang", (0.5, 1.2)) * wall
-        over *= draws.pick("lid_edge", ["flush", "overhanging"]) == "overhanging"
+        overhang = draws.number("lid_overhang", (0.5, 1.2)) * wall
+        over = draws.one_of("lid_edge", {"flush": 0.0, "overhanging": overhang})
         low, high = (-x - over, -y - over, seam), (x, y + over, seam + thick)
         solid = box(low, high, fillet=radius, axis=2) if radius > 0 else box(low, high, fillet=0.2 * thick, steps=2)
         inner = 0.6 * over
@@ -161,7 +158,7 @@ def _lid(
         rise = height * draws.number("lid_height", (0.15, 0.9), (0.08, 1.6), tails=0.2)
         if radius == 0.0:
             return tray((-x, -y, seam), (x, y, seam + rise), wall, min(wall, 0.7 * rise), side=-1), seam + rise, False
-        bevel = min(0.6 * radius, 0.5 * rise) if draws.pick("top_edge", ["sharp", "bevelled"]) == "bevelled" else 0.0
+        bevel = draws.one_of("top_edge", {"sharp": 0.0, "bevelled": min(0.6 * radius, 0.5 * rise)})
         profile = [(0.0, bevel), (0.3 * bevel / rise, 0.3 * bevel), (bevel / rise, 0.0), (1.0, 0.0)]
         shape = profile if bevel > 0 else [(0.0, 0.0), (1.0, 0.0)]
         floor = min(wall + bevel, 0.7 * rise)
@@ -185,7 +182,7 @@ def _latches(draws: Draws, chest: Assembly, front: float, y: float, seam: float,
     """Hasps on the lid's front that hang down over the body and flip up."""
     width, upper, pin = min(0.08 * y, 0.02), min(0.4 * (top - seam), 0.1 * y, 0.025), 0.0025
     axis_x, z = -front - 2.2 * pin, seam + upper
-    for number, share in enumerate({1: (0.0,), 2: (-0.6, 0.6)}[draws.pick("latches", {1: 0.5, 2: 0.5})]):
+    for number, share in enumerate(draws.one_of("latches", {1: (0.0,), 2: (-0.6, 0.6)}, (0.5, 0.5))):
         middle = share * y
         solid = rod(axis_x, (middle - width, middle + width), z, pin, sections=12)
         solid += box((axis_x - 0.002, axis_x + 0.001), about(middle, width), (seam - 1.4 * upper, z), fillet=0.001)

@@ -11,9 +11,8 @@ from artsim.common.elementary import cos, hypot, power, sin
 from artsim.common.products import norm
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import SIDE, UP, ends
+from artsim.making.outlines import SIDE, UP, Array, ends
 from artsim.making.solids import Solid, box, ring, rod, tube, vessel
-from artsim.model.kinematics import Array
 
 SIDES = 20
 """Segments of the vessel's circle."""
@@ -133,9 +132,8 @@ def _bail(draws: Draws, half: float, reach: float, pivot: float, pin: float, wir
     height = reach * draws.number("bail_height", (1.0, 1.3) if draws.chance("low_bail", 0.6) else (1.2, 1.7))
     if curved:  # from a half circle to a rounded rectangle
         angles = np.linspace(0.0, np.pi, 17)
-        cosine, sine, bend = cos(angles), sin(angles), draws.number("bail_bend", (0.5, 0.95))
-        if draws.pick("bail", ["circle", "squarish"]) == "circle":
-            bend = 0.95
+        cosine, sine = cos(angles), sin(angles)
+        bend = draws.one_of("bail", {"circle": 0.95, "squarish": draws.number("bail_bend", (0.5, 0.95))})
         path = np.column_stack(
             [np.zeros(17), half * np.sign(cosine) * power(np.abs(cosine), bend), pivot + height * power(sine, bend)]
         )

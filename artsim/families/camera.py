@@ -12,9 +12,8 @@ from artsim.common.elementary import cos, sin
 from artsim.families.lenses import Lens
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, swivel
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, SIDE, UP, about, turns
+from artsim.making.outlines import FRONT, SIDE, UP, Array, about, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, prism, ring, rod, tube, union
-from artsim.model.kinematics import Array
 
 GAP = 0.0005
 DENSITY = 900.0
@@ -25,8 +24,6 @@ _MEASURES = {
     "instant": ((0.1, 0.15), (1.3, 2.1), (0.6, 1.3)),
 }
 """Width of a body, metres; its height and depth as shares of half of that."""
-_ROUND = {"all": None, "upright": 2, "crosswise": 1, "lengthwise": 0}
-"""Which edges are round: the axis along which they lie."""
 
 
 class Shell:
@@ -40,8 +37,7 @@ class Shell:
         draws.rng.random(len(_MEASURES) - 1 - place)
         self.height, self.depth = draws.length("height", tall, of=half), draws.length("depth", deep, of=half)
         radius = self.height * draws.number("lens_radius", (0.24, 0.4) if kind != "instant" else (0.18, 0.3))
-        shift = draws.number("lens_shift", (-0.35, 0.1))
-        y = half * shift if draws.pick("lens_place", ["middle", "aside"]) == "aside" else 0.0
+        y = draws.one_of("lens_place", {"middle": 0.0, "aside": half * draws.number("lens_shift", (-0.35, 0.1))})
         self.lens_y = float(np.clip(y, -half + radius + 0.004, half - radius - 0.014))
         self.lens_z = self.height * draws.number("lens_height", (0.42, 0.52))
         self.lens_radius = min(radius, self.lens_z - 0.002)
@@ -73,7 +69,7 @@ def _body(draws: Draws, shell: Shell, kind: str) -> tuple[Solid, tuple[float, fl
     """The body; the span along Y and the height of what stands on its middle, for a flash."""
     half, depth, height = shell.half, shell.depth, shell.height
     r = min(draws.number("edge_radius", (0.05, 0.45)) * depth, 0.4 * height)
-    axis = _ROUND[draws.pick("round_edges", list(_ROUND))]
+    axis = draws.one_of("round_edges", {"all": None, "upright": 2, "crosswise": 1, "lengthwise": 0})
     body = box((0, depth), half, (0, height), fillet=r, axis=axis)
     if draws.chance("covering", 0.4):  # covering between two metal plates
         body += box((-0.001, depth + 0.001), half + 0.0005, (0.16 * height, 0.8 * height), fillet=r, axis=2)
@@ -241,7 +237,7 @@ def _camcorder(draws: Draws) -> Assembly:
     depth = draws.length("depth", (0.09, 0.2))
     lens_z = height * draws.number("lens_height", (0.5, 0.62))
     r = draws.number("edge_radius", (0.1, 0.6)) * half
-    axis = _ROUND[draws.pick("round_edges", ["all", "lengthwise", "crosswise"])]
+    axis = draws.one_of("round_edges", {"all": None, "lengthwise": 0, "crosswise": 1})
     body = box((0, depth), half, (0, height), fillet=r, axis=axis)
     style = draws.pick("lens", ["tubes", "prime", "zoom"])
     lens = Lens(draws, (0.0, 0.0, lens_z), min(half, 0.38 * height) * 0.92, style)

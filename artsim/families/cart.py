@@ -19,10 +19,10 @@ from artsim.making.solids import Solid, box, posts, rod, tray, tube, union
 
 def build(draws: Draws) -> Assembly:
     """A cart that moves towards -X; whoever pushes it stands at +X. Everything is folded out and shut at rest."""
-    kinds = {"shopping_cart": 0.2, "platform_trolley": 0.15, "hand_truck": 0.16, "service_trolley": 0.2,
-             "wheelbarrow": 0.09, "wagon": 0.1, "hand_cart": 0.1}  # fmt: skip
-    makers = (shopping_cart, _platform_trolley, _hand_truck, _service_trolley, _wheelbarrow, wagon, hand_cart)
-    return dict(zip(kinds, makers, strict=True))[draws.pick("kind", kinds)](draws)
+    makers = {"shopping_cart": shopping_cart, "platform_trolley": _platform_trolley, "hand_truck": _hand_truck,
+              "service_trolley": _service_trolley, "wheelbarrow": _wheelbarrow, "wagon": wagon,
+              "hand_cart": hand_cart}  # fmt: skip
+    return draws.one_of("kind", makers, (0.2, 0.15, 0.16, 0.2, 0.09, 0.1, 0.1))(draws)
 
 
 def _platform_trolley(draws: Draws) -> Assembly:
@@ -80,7 +80,7 @@ def _hand_truck(draws: Draws) -> Assembly:
     body = union(tube([(0.0, s * half, 0.02), (0.0, s * half, height)], r, 10) for s in (-1.0, 1.0))
     for share in np.linspace(0.08, 0.95 if slides else 0.75, draws.integer("crossbars", 3, 5)).tolist():
         z = share * height
-        bulge = {"straight": 0.0, "bowed": 0.03}[draws.pick("crossbar_shape", ["straight", "bowed"])]
+        bulge = draws.one_of("crossbar_shape", {"straight": 0.0, "bowed": 0.03})
         body += tube([(0.0, -half, z), (bulge, -0.4 * half, z), (bulge, 0.4 * half, z), (0.0, half, z)], 0.75 * r, 8)
     if draws.chance("back_plate", 0.4):
         body += box(0.003, 0.3 * half, (0.08 * height, 0.75 * height))
@@ -169,8 +169,7 @@ def _service_trolley(draws: Draws) -> Assembly:
             body += box(depth + 0.01, half + 0.01, (top - 0.002, top + 0.018), fillet=0.01, axis=2)
     else:
         body += posts(depth - post, half - post, (base, top), post, sections=10)
-        count = draws.integer("shelves", 2, 4)
-        lower = 0.06 * (draws.pick("top_shelf", ["at_the_top", "lower"]) == "lower")
+        count, lower = draws.integer("shelves", 2, 4), draws.one_of("top_shelf", {"at_the_top": 0.0, "lower": 0.06})
         for z in np.linspace(base + 0.01, top - lower, count).tolist():
             rim = draws.length("shelf_rim", (0.02, 0.09))
             if draws.pick("shelf", ["flat", "rimmed"]) == "rimmed":

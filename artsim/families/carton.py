@@ -83,8 +83,7 @@ def _flaps(draws: Draws, kind: str, x: float, y: float, wall: float, height: flo
     def bar(reach: float, low: float, high: float, tip: float = 0.0) -> Array:
         return np.array([(0.0, low), (0.0, high), (reach, high - tip), (reach, low + tip)])
 
-    tip = draws.length("flap_taper", (0.0, 0.03))
-    tip *= draws.pick("flap_ends", ["square", "tapered"]) == "tapered"
+    tip = draws.one_of("flap_ends", {"square": 0.0, "tapered": draws.length("flap_taper", (0.0, 0.03))})
     if kind == "one":
         return [("back", False, bar(2 * x, -y, y, 0.0))]
     if kind == "two":

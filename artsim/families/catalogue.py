@@ -1,9 +1,9 @@
 """What each procedural category is: its family's own words, and what its first objects are like."""
 
 import inspect
-import sys
 from collections import Counter
 from collections.abc import Sequence
+from importlib import import_module
 from textwrap import wrap
 
 from artsim.common.names import name_fix
@@ -26,7 +26,7 @@ def parameters(category: str) -> str:
     """
     if category not in FAMILIES:
         raise ConfigError(f"there is no category {category!r}", fix=name_fix(category, sorted(FAMILIES)))
-    return inspect.cleandoc(sys.modules[FAMILIES[category].__module__].__doc__ or "")
+    return inspect.cleandoc(import_module(f"artsim.families.{category}").__doc__ or "")
 
 
 def describe_family(category: str, count: int = 20) -> str:

@@ -10,9 +10,8 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import SIDE, UP, about, turns
+from artsim.making.outlines import SIDE, UP, Array, about, turns
 from artsim.making.solids import Solid, box, cylinder, frame, hull_of, ring, rod, tube, union
-from artsim.model.kinematics import Array
 
 GAP = 0.0025
 _ARMRESTS = {False: {"none": 0.4, "fixed": 0.4, "sliding": 0.2}, True: {"none": 1.0, "fixed": 0.0, "sliding": 0.0}}
@@ -73,7 +72,7 @@ def build(draws: Draws) -> Assembly:
     joint = continuous("piston" if lifted else "base", UP, (0, 0, low))
     chair.add("seat", seat if tilting else seat + rest, joint, density=400.0)
     if tilting:
-        tilt = np.deg2rad(draws.degrees("back_angle", (12, 28)))
+        tilt = draws.turn("back_angle", (12, 28))
         chair.add("back", rest, revolute("seat", SIDE, hinge, 0.0, tilt), density=400.0)
     if arms == "sliding":
         _sliding_arms(draws, chair, depth, width, top)

@@ -21,11 +21,9 @@ from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull_of
 
 def build(draws: Draws) -> Assembly:
     """A clock; its face looks towards -X and the pendulum hangs straight at rest."""
-    shares = {"wall": 0.24, "pendulum": 0.16, "mantel": 0.16, "longcase": 0.13, "alarm": 0.15, "cuckoo": 0.08,
-              "watch": 0.08}  # fmt: skip
     makers = {"wall": wall_clock, "pendulum": pendulum_clock, "mantel": _mantel_clock, "longcase": _longcase_clock,
               "alarm": _alarm_clock, "cuckoo": cuckoo_clock, "watch": _watch}  # fmt: skip
-    return makers[draws.pick("kind", shares)](draws)
+    return draws.one_of("kind", makers, (0.24, 0.16, 0.16, 0.13, 0.15, 0.08, 0.08))(draws)
 
 
 def _mantel_clock(draws: Draws) -> Assembly:

@@ -6,9 +6,8 @@ from artsim.common.elementary import cos, sin
 from artsim.families.details import side_hinge
 from artsim.making.assembly import Assembly, JointSpec, continuous, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, about, turns
+from artsim.making.outlines import FRONT, Array, about, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull, hull_of, prism, revolved, rod, union
-from artsim.model.kinematics import Array
 
 CLOCKWISE = np.array([1.0, 0.0, 0.0])
 """Axis of the hands: a turn about it takes the top to someone's right who looks at the face."""

@@ -19,8 +19,7 @@ GAP = 0.0015
 def build(draws: Draws) -> Assembly:
     """An espresso, a drip or a pod machine, a percolator or an urn."""
     kinds = {"espresso": _espresso, "drip": _drip, "pod": _pod, "percolator": _percolator, "urn": _urn}
-    kind = draws.pick("kind", {"espresso": 0.29, "drip": 0.29, "pod": 0.14, "percolator": 0.14, "urn": 0.14})
-    return kinds[kind](draws)
+    return draws.one_of("kind", kinds, (0.29, 0.29, 0.14, 0.14, 0.14))(draws)
 
 
 def _drip_tray(draws: Draws, machine: Assembly, x: float, front: float, y: float, high: float) -> None:
@@ -80,7 +79,7 @@ def _espresso(draws: Draws) -> Assembly:
             for s in (-1, 1)
         )
     away = -wand_side if wand_side else draws.side("portafilter_side")
-    limit = np.deg2rad(draws.degrees("portafilter_angle", (35.0, 55.0)))
+    limit = draws.turn("portafilter_angle", (35.0, 55.0))
     machine.add("portafilter", basket, revolute("body", (0, 0, -away), group, 0.0, limit), density=3000.0)
 
     if wand_side:
@@ -89,14 +88,14 @@ def _espresso(draws: Draws) -> Assembly:
         bends = (-0.025, 0.01 * wand_side, -0.6 * drop), (-0.03, 0.014 * wand_side, -drop)
         wand = tube(foot + np.array([(0, 0, 0), (0, 0, -0.02), *bends]), 0.0045, 10)
         wand += cylinder(foot, foot - (0, 0, 0.014), 0.009, sections=14)
-        limit = np.deg2rad(draws.degrees("wand_angle", (60.0, 120.0)))
+        limit = draws.turn("wand_angle", (60.0, 120.0))
         machine.add("steam_wand", wand, revolute("body", (0, 0, -wand_side), foot, 0.0, limit), density=3000.0)
     _controls(draws, machine, -x, y, head_low, height)
     if with_lid:  # of the water tank
         seam, thick = height + GAP, 0.008
         lid = box((0.25 * x, 0.97 * x), 0.7 * y, (seam, seam + thick), fillet=0.01, axis=2)
         tab = box((0.27 * x, 0.27 * x + 0.012), 0.012, (seam + 0.5 * thick, seam + thick + 0.004), fillet=0.002)
-        limit = np.deg2rad(draws.degrees("lid_angle", (70.0, 100.0)))
+        limit = draws.turn("lid_angle", (70.0, 100.0))
         hinge = revolute("body", (0, 1, 0), (0.97 * x, 0, seam), 0.0, limit)
         machine.add("lid", lid + tab.called("handle", UP), hinge, density=900.0)
     return machine
@@ -133,8 +132,7 @@ def _drip(draws: Draws) -> Assembly:
     head_low = height - head
     body = box(x, y, (0, base), fillet=radius, axis=2)
     body += box((back, x + 0.02), y, (0, height), fillet=min(radius, 0.02), axis=2)
-    shrink = draws.number("head_taper", (0.0, 0.15))
-    shrink = y * (shrink if draws.pick("head_shape", ["straight", "tapered"]) == "tapered" else 0.0)
+    shrink = y * draws.one_of("head_shape", {"straight": 0.0, "tapered": draws.number("head_taper", (0.0, 0.15))})
     reach = center - 0.5 * pot if draws.chance("head_short", 0.3) else -x  # it ends above the middle of the carafe
     body += _tapered((reach, -y), (x + 0.018, y), (head_low, height), radius, shrink)
     body += rod(center, 0, (base - 0.002, base + 0.003), 0.8 * pot)
@@ -157,7 +155,7 @@ def _drip(draws: Draws) -> Assembly:
         travel = draws.length("lid_travel", (0.02, 0.2))
         machine.add("lid", lid, prismatic("body", UP, 0.0, travel, (0.5 * (reach + hinge), 0, seam)))
     else:
-        limit = np.deg2rad(draws.degrees("lid_angle", (50.0, 115.0)))
+        limit = draws.turn("lid_angle", (50.0, 115.0))
         machine.add("lid", lid, revolute("body", (0, 1, 0), (hinge, 0, seam), 0.0, limit))
     if plain:
         return machine
@@ -186,8 +184,7 @@ def _percolator(draws: Draws) -> Assembly:
     body += rod(0, 0, (foot - 0.002, foot + waist + 0.002), 0.95 * narrow, 0.85 * narrow)
     low, top = foot + waist, foot + waist + tall
     body += vessel([(narrow, low), (radius, top)], 0.004, sections=20)
-    turn = {"left": 0.5, "right": -0.5, "back": 0.0, "front": 1.0}
-    side = turn[draws.pick("handle_side", list(turn))] * np.pi
+    side = draws.one_of("handle_side", {"left": 0.5, "right": -0.5, "back": 0.0, "front": 1.0}) * np.pi
     out = radius + draws.length("handle_reach", (0.03, 0.06))
     grip = [(narrow, 0, low + 0.2 * tall), (out, 0, low + 0.3 * tall), (out, 0, top - 0.03),
             (radius - 0.002, 0, top - 0.02)]  # fmt: skip
@@ -203,7 +200,7 @@ def _percolator(draws: Draws) -> Assembly:
         lid += rod(0, 0, (seam - draws.length("lid_plug", (0.004, 0.02)), seam + 0.001), 0.45 * radius, 0.75 * radius)
         joint = prismatic("body", UP, 0.0, draws.number("lid_travel", (0.02, 0.8)) * tall, (0, 0, seam))
     else:
-        limit = np.deg2rad(draws.degrees("lid_angle", (60.0, 110.0)))
+        limit = draws.turn("lid_angle", (60.0, 110.0))
         joint = revolute("body", (0, 1, 0), (radius + 0.004, 0.0, seam), 0.0, limit)
     machine.add("lid", lid, joint)
     return machine
@@ -259,7 +256,7 @@ def _pod(draws: Draws) -> Assembly:
     for s in (-1.0, 1.0):
         lever += box((tip, pivot + 0.006), (s * wide, s * (wide - 0.01)), upright, fillet=0.004)
     lever += rod(pivot, (-wide, wide), axle, 0.005, sections=12)
-    limit = np.deg2rad(draws.degrees("lever_angle", (60.0, 105.0)))
+    limit = draws.turn("lever_angle", (60.0, 105.0))
     machine.add("lever", lever, revolute("body", (0, 1, 0), (pivot, 0, axle), 0.0, limit), density=900.0)
     top = height * draws.number("tank_height", (0.8, 0.98))
     tank = box((tank_x + GAP, x), 0.9 * y, (base + GAP, top), fillet=0.015, axis=2)
@@ -274,7 +271,7 @@ def _urn(draws: Draws) -> Assembly:
     y = x * (1.0 if draws.chance("width_as_depth", 0.5) else draws.number("width_share", (0.7, 1.35)))
     height = draws.length("height", (1.1, 2.9), of=2 * x)
     corner = draws.number("corner_radius", (0.1, 0.6))
-    radius = min(x, y) * (corner if draws.pick("outline", ["round", "square"]) == "square" else 0.999)
+    radius = min(x, y) * draws.one_of("outline", {"round": 0.999, "square": corner})
     niche = draws.pick("front", {"niche": 0.5, "tap": 0.5}) == "niche"
     if niche:  # a foot, a column at the back, and a head
         foot, head = 0.09 * height, draws.number("head_height", (0.35, 0.6)) * height
@@ -318,7 +315,7 @@ def _urn(draws: Draws) -> Assembly:
         hinge, half = (side_x + 0.006, 0.0, seam + 0.002), 0.3 * side_y
         lid += box((side_x - 0.3 * x, hinge[0]), half, (seam, seam + 0.004))
         lid += rod(hinge[0], (-half, half), hinge[2], 0.002, sections=10)
-        limit = np.deg2rad(draws.degrees("lid_angle", (60.0, 110.0)))
+        limit = draws.turn("lid_angle", (60.0, 110.0))
         joint = revolute("body", (0, 1, 0), hinge, 0.0, limit)
     machine.add("lid", lid, joint)
     if niche and draws.chance("controls", 0.6):

@@ -47,9 +47,8 @@ def build(draws: Draws) -> Assembly:
     outline = [(point, -side), (slant, side), (blade_end, side), (blade_end, -side)]
     blade = prism(outline, c.channel, c.channel + c.sheet)
     button = min(c.length * draws.number("button_length", (0.05, 0.2)), 0.03)
-    forward = draws.number("button_forward", (0.0, 0.2))
-    at_end = draws.pick("button_place", ["end", "forward"]) == "end"
-    button_end = blade_end if at_end else blade_end - forward * c.length
+    forward = draws.number("button_forward", (0.0, 0.2)) * c.length
+    button_end = blade_end - draws.one_of("button_place", {"end": 0.0, "forward": forward})
     top = height + draws.length("button_height", (0.002, 0.006) if height > 0.009 else (0.0012, 0.003))
     blade += _button(draws, button_end - button, button_end, top, c).called("button", UP)
     # The button stops before the bridge over the slot at the nose.

@@ -8,11 +8,10 @@ from numpy.typing import ArrayLike
 
 from artsim.common.elementary import arctan2, cos, sin
 from artsim.common.products import unit
-from artsim.making.assembly import JointSpec, revolute
+from artsim.making.assembly import Assembly, JointSpec, prismatic, revolute
 from artsim.making.draws import Draws, Interval
-from artsim.making.outlines import FRONT, Span, Vector, ends, rounded_rectangle
+from artsim.making.outlines import FRONT, Array, Span, Vector, ends, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, deferred, frame, hull, hull_of, prism, rod, tube, union
-from artsim.model.kinematics import Array
 
 
 def drawn_from(
@@ -242,6 +241,12 @@ def push_button(face: Vector, size: Vector, round_off: float) -> Solid:
     return box(face - half - (0.008, 0, 0), face + half - (0.0022, 0, 0), fillet=round_off, axis=0).called(
         "button", FRONT
     )
+
+
+def add_push_button(machine: Assembly, number: int, face: Vector, size: Vector, round_off: float) -> None:
+    """Add a :func:`push_button` to a body that faces -X."""
+    slide = prismatic("body", (1, 0, 0), 0.0, 0.0015, face)
+    machine.add(f"button_{number}", push_button(face, size, round_off), slide)
 
 
 @deferred

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from artsim.common.elementary import hypot
-from artsim.families.details import dial, flat_handle, front_handle, push_button, wire_shelf
+from artsim.families.details import add_push_button, dial, flat_handle, front_handle, wire_shelf
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, UP, about
@@ -66,8 +66,7 @@ def build(draws: Draws) -> Assembly:
         strip = max(strip, wall)
     hinge_x = -thick
     if not flush:
-        inside = draws.number("hinge_depth", (0.0, 0.6))
-        hinge_x *= inside if draws.pick("hinge", ["back", "inside"]) == "inside" else 0.0
+        hinge_x *= draws.one_of("hinge", {"back": 0.0, "inside": draws.number("hinge_depth", (0.0, 0.6))})
     swing = float(hypot(hinge_x, height - plinth)) - (height - plinth)  # the upper back edge rises while it opens
     half, depth, top = 0.5 * width, draws.length("depth", (0.42, 0.64)), height - strip - 1.3 * swing - 2 * GAP
     half_door = half - (wall + GAP if flanked else draws.length("door_gap", (0.0, 0.004)))
@@ -82,7 +81,7 @@ def build(draws: Draws) -> Assembly:
         body += union(_rack(draws, front, back, side, low) for low in _rack_heights(shape))
     machine.add("body", body, density=300.0)
     level = draws.chance("door_opens_level", 0.7)
-    opening = 0.5 * np.pi if level else np.deg2rad(draws.degrees("door_angle", (75.0, 90.0)))
+    opening = 0.5 * np.pi if level else draws.turn("door_angle", (75.0, 90.0))
     hinge = revolute("body", (0, -1, 0), (hinge_x, 0.0, hinge_z), 0.0, opening)
     machine.add("door", _door(draws, shape, strip > 0.05, machine), hinge)
     if strip > 0.05 and draws.chance("controls", 0.6):
@@ -196,10 +195,8 @@ def _controls(draws: Draws, machine: Assembly, s: Shape) -> None:
     ys = np.linspace(-0.8, 0.8, 9) * s.half
     first, count = draws.integer("first_button", 0, 4), draws.integer("buttons", 1, 4)
     for number, y in enumerate(ys[first : first + count], 1):
-        face = (-s.thick, y, z)
-        corner = size if draws.pick("button_shape", ["square", "round"]) == "round" else 0.002
-        button = push_button(face, (2 * size, 2 * size), corner)
-        machine.add(f"button_{number}", button, prismatic("body", (1, 0, 0), 0.0, 0.0015, face))
+        corner = draws.one_of("button_shape", {"square": 0.002, "round": size})
+        add_push_button(machine, number, (-s.thick, y, z), (2 * size, 2 * size), corner)
     if draws.chance("dial", 0.5):
         foot = (-s.thick, ys[(first + count + 1) % 9], z)
         machine.add("dial", dial(foot, FRONT, 0.02, min(0.022, 0.4 * room)), continuous("body", FRONT, foot))

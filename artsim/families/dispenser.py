@@ -11,9 +11,8 @@ from artsim.families.details import front_handle, rounded_tray, side_hinge
 from artsim.families.vessels import GAP, Level, cap, cross_section, dome, moulded, neck, pump_head, ribs
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, screw
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, UP, about, turns
+from artsim.making.outlines import FRONT, UP, Array, about, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, rod, tube, union
-from artsim.model.kinematics import Array
 
 DENSITY = 400.0  # kg/m^3, as the pieces are solid and real ones are hollow
 CLEAR = 0.0015
@@ -22,8 +21,7 @@ CLEAR = 0.0015
 def build(draws: Draws) -> Assembly:
     """A dispenser, shut at rest; it gives towards -X."""
     kinds = {"pump": _pump_bottle, "soap_box": _soap_box, "drink_jar": _drink_jar, "water_cooler": _water_cooler}
-    kind = draws.pick("kind", {"pump": 0.5, "soap_box": 0.18, "drink_jar": 0.2, "water_cooler": 0.12})
-    return kinds[kind](draws)
+    return draws.one_of("kind", kinds, (0.5, 0.18, 0.2, 0.12))(draws)
 
 
 def _pump_bottle(draws: Draws) -> Assembly:
@@ -52,8 +50,7 @@ def _pump_bottle(draws: Draws) -> Assembly:
     low, high = height + GAP, rim + GAP + wall
     stem = min(radius * draws.number("stem_radius", (0.25, 0.4)), 0.006)
     stroke = (rim - height) * draws.number("stroke", (0.4, 0.75))
-    turret = draws.number("turret_height", (0.3, 1.2))
-    turret = outer * (turret if draws.pick("collar_shape", ["plain", "turret"]) == "turret" else 0.0)
+    turret = outer * draws.one_of("collar_shape", {"plain": 0.0, "turret": draws.number("turret_height", (0.3, 1.2))})
     size = outer * draws.number("head_radius", (0.6, 1.25))
     reach = max(draws.number("nozzle_reach", (0.9, 2.2)) * max(depth, outer), 1.3 * size)
     head = high + turret + stroke + 0.0015 + (0.25 * reach if turret < 0.5 * reach else 0.0)

@@ -12,9 +12,8 @@ from artsim.families.keys import Face, add_buttons, add_key, front_face, key_out
 from artsim.families.screens import Panel, draw_panel, screen
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, UP, about, rounded_rectangle
+from artsim.making.outlines import FRONT, UP, Array, about, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, ring, rod, tube
-from artsim.model.kinematics import Array
 
 GAP = 0.0015
 
@@ -22,8 +21,8 @@ GAP = 0.0015
 def build(draws: Draws) -> Assembly:
     """A display; upright and at its lowest, no key pressed at rest."""
     display = Assembly()
-    kind = draws.pick("kind", {"stand": 0.58, "feet": 0.14, "tube": 0.16, "easel": 0.12})
-    {"stand": _on_stand, "feet": _on_feet, "tube": _tube, "easel": _on_easel}[kind](draws, display)
+    makers = {"stand": _on_stand, "feet": _on_feet, "tube": _tube, "easel": _on_easel}
+    draws.one_of("kind", makers, (0.58, 0.14, 0.16, 0.12))(draws, display)
     return display
 
 
@@ -34,7 +33,7 @@ def _keys(draws: Draws, display: Assembly, parent: str, face: Face, half: float,
     count = draws.integer("buttons", 1, 6)
     wide = min(draws.number("button_width", (0.8, 2.5)) * size, 0.028)
     kind = draws.pick("button_shape", ["round", "square", "pill"])
-    side = {"left": -1.0, "middle": 0.0, "right": 1.0}[draws.pick("button_side", ["left", "middle", "right"])]
+    side = draws.one_of("button_side", {"left": -1.0, "middle": 0.0, "right": 1.0})
     travel = draws.length("button_travel", (0.0008, 0.0015))
     pitch = 1.3 * max(wide, size)
     middle = side * (half - 0.5 * count * pitch - 0.01)

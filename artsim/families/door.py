@@ -13,9 +13,8 @@ from artsim.common.elementary import cos, sin
 from artsim.families.details import bar_handle, grid_panel, swing_limits
 from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, about
+from artsim.making.outlines import FRONT, Array, about
 from artsim.making.solids import Solid, box, deferred, ellipsoid, frame, hull, ring, rod, tube, union
-from artsim.model.kinematics import Array
 
 GAP = 0.004
 PROUD = 0.014
@@ -59,7 +58,7 @@ def build(draws: Draws) -> Assembly:
     if kind == "sliding":
         _sliding(draws, door, width, height, depth, style)
         return door
-    style.limit = float(np.deg2rad(draws.degrees("opening_angle", (60.0, 175.0))))
+    style.limit = draws.turn("opening_angle", (60.0, 175.0))
     ajar = draws.number("open_share", (0.1, 0.75)) * style.limit if draws.chance("ajar", 0.25) else 0.0
     both = draws.chance("handles_on_both", 0.5)
     sides = [draws.side("hinge")] if kind == "single" else [1.0, -1.0]
@@ -229,4 +228,4 @@ def _turning_handle(
         path = [(x, y - 0.4 * side * radius, z), (x, y + 0.6 * side * length, z + droop),
                 (x + turn * 0.01, y + side * length, z + droop)]  # fmt: skip
         handle += tube(path, radius, 10)
-    return handle, 0.0, float(np.deg2rad(draws.degrees("lever_angle", (30.0, 50.0))))
+    return handle, 0.0, draws.turn("lever_angle", (30.0, 50.0))

@@ -14,9 +14,8 @@ from artsim.families.proportions import unusual_sides
 from artsim.families.table_parts import PEDESTALS, four_legs, levels
 from artsim.making.assembly import Assembly, prismatic
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, Vector
+from artsim.making.outlines import FRONT, Array, Vector
 from artsim.making.solids import Solid, box, frame, tray, union
-from artsim.model.kinematics import Array
 
 GAP = 0.002
 _FRONT = 0.018  # thickness of a front
@@ -110,8 +109,7 @@ class _Furniture(Assembly):
 def build(draws: Draws) -> Assembly:
     """A body with drawers that slide out towards -X, closed at rest."""
     furniture = _Furniture(draws)
-    kinds = {"chest": _chest, "table": _table, "desk": _desk}
-    kinds[draws.pick("kind", {"chest": 0.45, "table": 0.3, "desk": 0.25})](draws, furniture)
+    draws.one_of("kind", {"chest": _chest, "table": _table, "desk": _desk}, (0.45, 0.3, 0.25))(draws, furniture)
     return furniture
 
 
@@ -207,7 +205,7 @@ def _desk(draws: Draws, furniture: _Furniture) -> None:
     x, y, top = depth / 2 - over, width / 2 - over, height - thick
     furniture.body += _top(draws, depth, width, top, height)
     pedestal = min(draws.length("pedestal_width", (0.28, 0.45)), 0.4 * width)
-    sides = PEDESTALS[draws.pick("pedestals", {"right": 0.35, "left": 0.35, "both": 0.3})]
+    sides = draws.one_of("pedestals", PEDESTALS, (0.35, 0.35, 0.3))
     on_legs = draws.chance("on_legs", 0.4)
     leg = draws.length("leg_width", (0.035, 0.07))
     low = 0.0

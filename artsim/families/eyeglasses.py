@@ -12,9 +12,8 @@ import numpy as np
 from artsim.common.elementary import arcsin, cos, hypot, power, sin
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, about, normals
+from artsim.making.outlines import FRONT, Array, about, normals
 from artsim.making.solids import Solid, box, deferred, ellipsoid, hull, hull_of, loft, rod, tube, union
-from artsim.model.kinematics import Array
 
 GAP = 0.0006
 MM = 0.001
@@ -92,9 +91,9 @@ def build(draws: Draws) -> Assembly:
         bend = others.number("hanging_bend", (0.02, 0.62)) * 2 * front.half
     temple = _temple(draws, front, max(bend, 0.0), flat)
     rise = float(np.ptp(temple.bounds()[:, 2])) + 2.0 * MM
-    upper = {"left": -1, "right": 1}[draws.pick("upper_temple", ["left", "right"])]
+    upper = draws.one_of("upper_temple", {"left": -1, "right": 1})
     tilt = upper * arcsin(min(rise / (2 * front.half), 1.0))
-    limit = np.deg2rad(draws.degrees("temple_angle", (77.0, 87.0)))
+    limit = draws.turn("temple_angle", (77.0, 87.0))
     if aside:  # no temple passes the middle
         tilt, reach = 0.0, float(temple.bounds()[1, 0])
         limit = min(limit, arcsin(min((front.half - front.thickness - 1.0 * MM) / reach, 1.0)))
@@ -277,9 +276,9 @@ def _hinge(front: Front) -> tuple[Solid, Solid]:
 
 def _temple(draws: Draws, front: Front, bend: float, flat: bool) -> Solid:
     """Temple of the hinge at +y, along +x from the hinge at the origin, its end bent down."""
-    reach = draws.pick("temple_reach", {"usual": 0.55, "long": 0.2, "short": 0.25})
-    shares = {"usual": (0.92, 1.06), "long": (1.06, 1.24), "short": (0.42, 0.92)}[reach]
-    length = 2 * front.half * draws.number("temple_length", shares)
+    shares = {"usual": (0.92, 1.06), "long": (1.06, 1.24), "short": (0.42, 0.92)}
+    reach = draws.one_of("temple_reach", shares, (0.55, 0.2, 0.25))
+    length = 2 * front.half * draws.number("temple_length", reach)
     x = np.concatenate([np.linspace(GAP, 0.6 * length, 4), np.linspace(0.68, 1.0, 8) * length])
     share = np.clip(x / length - draws.number("bend_start", (0.66, 0.74)), 0, 1)
     z = -bend * power(share / share[-1], draws.number("bend_sharpness", (1.2, 1.8)))

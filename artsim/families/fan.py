@@ -20,8 +20,7 @@ GAP = 0.002
 
 def build(draws: Draws) -> Assembly:
     """A fan that blows towards -X (a ceiling fan: downward)."""
-    makers = {"head": _head_fan, "ceiling": _ceiling_fan, "box": _box_fan}
-    return makers[draws.pick("kind", {"head": 0.7, "ceiling": 0.17, "box": 0.13})](draws)
+    return draws.one_of("kind", {"head": _head_fan, "ceiling": _ceiling_fan, "box": _box_fan}, (0.7, 0.17, 0.13))(draws)
 
 
 def _head_fan(draws: Draws) -> Assembly:
@@ -47,7 +46,7 @@ def _head_fan(draws: Draws) -> Assembly:
         stages.append(("pole", pole, prismatic("", UP, 0.0, 0.75 * deep, (0, 0, sleeve))))
     else:
         base += rod(0, 0, (0.005, height), column * (1.0 if standing else 1.5), column, 20)
-    swing = np.deg2rad(draws.degrees("swing", (30.0, 75.0)))
+    swing = draws.turn("swing", (30.0, 75.0))
     turn = revolute("", UP, (0, 0, height), -swing, swing) if swings else None
     stages.append(("neck", _neck(column, motor, height + (GAP if swings else -0.002), level, 0.85 * motor), turn))
     pins = 0.85 * motor + (-GAP if tilts else 0.002)
@@ -56,7 +55,7 @@ def _head_fan(draws: Draws) -> Assembly:
     nod = None
     if tilts:
         down = _steepest(cage, back, middle, 1.9 * column + 0.008)
-        nod = revolute("", SIDE, (0, 0, level), -down, np.deg2rad(draws.degrees("tilt_up", (15.0, 35.0))))
+        nod = revolute("", SIDE, (0, 0, level), -down, draws.turn("tilt_up", (15.0, 35.0)))
     stages.append(("head", head, nod))
     blades = _blades(draws, cage, 2.0 * abs(middle - back)).moved((middle, 0, level))
     blades += rod((middle, back - GAP), 0, level, 0.03 * cage, sections=10)
@@ -198,7 +197,7 @@ def _ceiling_fan(draws: Draws) -> Assembly:
         bowl = (0.75 * body, 0.75 * body, draws.length("lamp_height", (0.4, 0.8), of=body))
         rotor += ellipsoid((0, 0, low - tall), bowl, 20)
     half, z = 0.5 * draws.length("blade_width", (0.1, 0.16)), low - 0.6 * tall
-    pitch = np.deg2rad(draws.degrees("blade_pitch", (8.0, 15.0)))
+    pitch = draws.turn("blade_pitch", (8.0, 15.0))
     root = body + draws.length("blade_arm", (0.03, 0.08))
     corner = draws.length("blade_corner", (0.2, 1.0), of=half)
     paddle = box((-reach, -root), half, 0.004, fillet=corner, axis=2, steps=4)

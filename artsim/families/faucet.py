@@ -11,9 +11,8 @@ from artsim.common.elementary import arcsin, cos, sin
 from artsim.common.products import unit
 from artsim.making.assembly import Assembly, revolute, screw, swivel
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, SIDE, UP, circle, turns
+from artsim.making.outlines import FRONT, SIDE, UP, Array, circle, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, rod, tube, union
-from artsim.model.kinematics import Array
 
 GAP = 0.001
 BRASS = 3000.0  # kg/m^3, as the pieces are solid and real ones are hollow
@@ -23,8 +22,7 @@ def build(draws: Draws) -> Assembly:
     """A faucet; the water comes out towards -X. All handles are shut at rest."""
     makers = {"basin": _basin_mixer, "kitchen": _kitchen_mixer, "set": _three_piece, "pillar": _pillar_tap,
               "wall": _wall_tap}  # fmt: skip
-    kinds = {"basin": 0.34, "kitchen": 0.26, "set": 0.2, "pillar": 0.1, "wall": 0.1}
-    return makers[draws.pick("kind", kinds)](draws)
+    return draws.one_of("kind", makers, (0.34, 0.26, 0.2, 0.1, 0.1))(draws)
 
 
 def _basin_mixer(draws: Draws) -> Assembly:
@@ -57,8 +55,7 @@ def _basin_mixer(draws: Draws) -> Assembly:
         body += _nozzle(draws, path[-1] + 0.2 * (path[-2] - path[-1]), path[-1] - path[-2], 0.85 * r, 0.9 * r)
     lean = 0.0  # towards the front
     if draws.chance("handle_leans", 0.35):
-        lean = {"back": -1.0, "front": 1.0}[draws.pick("handle_leans_to", ["back", "front"])]
-        lean *= draws.angle("handle_tilt", (0.1, 0.5))
+        lean = draws.one_of("handle_leans_to", {"back": -1.0, "front": 1.0}) * draws.angle("handle_tilt", (0.1, 0.5))
     axis, start = (cos(lean) * UP + sin(lean) * FRONT, cos(lean) * FRONT - sin(lean) * UP)
     pivot = np.array([0.0, 0.0, height]) + 2.0 * radius * sin(abs(lean)) * axis
     if lean:  # the axis stands on a stub, so that the hub's rim clears the body's top

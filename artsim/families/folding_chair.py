@@ -11,9 +11,8 @@ from artsim.common.elementary import arctan2, cos, hypot, sin
 from artsim.common.products import norm, unit
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import SIDE, Vector, about
+from artsim.making.outlines import SIDE, Array, Vector, about
 from artsim.making.solids import Solid, box, cylinder, frame, hull, rod, union
-from artsim.model.kinematics import Array
 
 GAP = 0.004
 
@@ -56,7 +55,7 @@ class _Bar:
 def build(draws: Draws) -> Assembly:
     """A folding chair, unfolded at rest; one sits down facing -X."""
     kinds = {"crossed": _crossed, "legs_under": _under, "tip_up": _tip_up, "stool": _stool}
-    return kinds[draws.pick("kind", {"crossed": 0.45, "legs_under": 0.2, "tip_up": 0.2, "stool": 0.15})](draws)
+    return draws.one_of("kind", kinds, (0.45, 0.2, 0.2, 0.15))(draws)
 
 
 def _panel(draws: Draws, low: Vector, high: Vector, axis: int) -> Solid:

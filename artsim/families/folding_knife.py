@@ -10,9 +10,8 @@ import numpy as np
 from artsim.common.elementary import cos, power, sin
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import about, strips
+from artsim.making.outlines import Array, about, strips
 from artsim.making.solids import Solid, box, deferred, loft, prism, rod, union
-from artsim.model.kinematics import Array
 
 GAP = 0.0005
 RING = 16

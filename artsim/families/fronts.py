@@ -14,9 +14,8 @@ import numpy as np
 from artsim.families.details import front_handle, knob, panel, swing_limits
 from artsim.making.assembly import JointSpec, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, about
+from artsim.making.outlines import FRONT, Array, about
 from artsim.making.solids import Solid, box, cylinder, deferred, hull_of, tray
-from artsim.model.kinematics import Array
 
 GAP = 0.0015
 T = TypeVar("T")

@@ -22,9 +22,8 @@ GAP = 0.0015
 def build(draws: Draws) -> Assembly:
     """A globe; its axis leans to one side, the front faces -X."""
     radius = 0.5 * draws.length("diameter", (0.12, 0.4))  # of the sphere
-    other = draws.degrees("tilt", (0.0, 40.0))
-    lean = np.deg2rad({"earth": 23.4, "other": other}[draws.pick("axis", ["earth", "other"])])
-    lean *= {"left": -1.0, "right": 1.0}[draws.pick("leans_to", ["left", "right"])]
+    lean = np.deg2rad(draws.one_of("axis", {"earth": 23.4, "other": draws.degrees("tilt", (0.0, 40.0))}))
+    lean *= draws.one_of("leans_to", {"left": -1.0, "right": 1.0})
     axis = apply(rotation_about((1, 0, 0), lean), UP)
     thick = draws.length("arc_thickness", (0.04, 0.075), of=radius)
     arc_radius = draws.length("arc_radius", (1.08, 1.16), of=radius) + thick

@@ -12,9 +12,8 @@ from artsim.families.details import cheeks
 from artsim.families.vessels import Level, cross_section, dome, grip_loop, moulded
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, screw
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, UP, arch
+from artsim.making.outlines import FRONT, UP, Array, arch
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull, hull_of, ring, rod, tube
-from artsim.model.kinematics import Array
 
 GAP = 0.0015
 DENSITY = 500.0  # kg/m^3, as the pieces are solid and real ones are hollow
@@ -168,8 +167,7 @@ def _lid(draws: Draws, pot: Pot, hinged: bool) -> tuple[Solid, float]:
     radius = pot.mouth * draws.number("lid_radius", (0.9, 1.04))
     rim = draws.length("lid_rim", (0.003, 0.01))
     lid = rod(0, 0, (z, z + rim), radius, draws.number("lid_taper", (0.92, 1.0)) * radius)
-    arched = draws.number("lid_rise", (0.1, 0.5))
-    rise = radius * (arched if draws.pick("lid_shape", ["flat", "arched"]) == "arched" else 0.06)
+    rise = radius * draws.one_of("lid_shape", {"flat": 0.06, "arched": draws.number("lid_rise", (0.1, 0.5))})
     lid += dome(draws.number("dome_width", (0.8, 0.92)) * radius, z + rim - 0.0005, rise)
     top = z + rim + rise
     size = pot.mouth * draws.number("knob_size", (0.16, 0.28))
@@ -210,7 +208,7 @@ def _lid_joint(draws: Draws, kind: str, pot: Pot, room: float) -> JointSpec:
         kind = "turn"
     if kind == "hinge":
         x, _, r = pot.hinge
-        upper = np.deg2rad(draws.degrees("lid_angle", (60.0, 88.0)))
+        upper = draws.turn("lid_angle", (60.0, 88.0))
         return revolute("body", (0, 1, 0), (x, 0, pot.top + GAP + r), 0.0, upper)
     if kind == "turn":
         return continuous("body", UP, at)
@@ -249,8 +247,8 @@ def _swinging_bow(draws: Draws, kettle: Assembly, reach: float, low: float, high
     if draws.chance("bow_grip", 0.75):
         thick = r * draws.number("bow_grip_thickness", (1.5, 2.4))
         bow += tube([(0, -0.4 * reach, high), (0, 0.4 * reach, high)], thick, 14)
-    limit = np.deg2rad(draws.degrees("bow_angle", (20.0, 85.0)))
-    lower = -np.deg2rad(draws.degrees("bow_angle_forward", (5.0, 20.0))) if draws.chance("bow_both_ways", 0.4) else 0.0
+    limit = draws.turn("bow_angle", (20.0, 85.0))
+    lower = -draws.turn("bow_angle_forward", (5.0, 20.0)) if draws.chance("bow_both_ways", 0.4) else 0.0
     kettle.add("handle", bow, revolute("body", (0, 1, 0), (0, 0, low), lower, limit), density=1500.0)
 
 

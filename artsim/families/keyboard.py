@@ -17,9 +17,8 @@ from artsim.families.key_layouts import Cell, extent
 from artsim.families.keys import CLEAR, Face, key, key_outline, pill, press, top_face
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import about, rounded_rectangle
+from artsim.making.outlines import Array, about, rounded_rectangle
 from artsim.making.solids import Solid, box, hull, rod, tube, union
-from artsim.model.kinematics import Array
 
 GAP = 0.0005
 _HANDS = (("left", 1.0), ("right", -1.0))

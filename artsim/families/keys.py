@@ -8,9 +8,8 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, JointSpec, prismatic
 from artsim.making.draws import Draws
-from artsim.making.outlines import Vector, rounded_rectangle
+from artsim.making.outlines import Array, Vector, rounded_rectangle
 from artsim.making.solids import Solid, deferred, hull, prism, union
-from artsim.model.kinematics import Array
 
 CLEAR = 0.0003
 """Metres that a key at the end of its travel keeps from the face under it."""

@@ -12,9 +12,8 @@ from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import bow_handle, knob
 from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, SIDE, UP, Vector, about, ends
+from artsim.making.outlines import FRONT, SIDE, UP, Array, Vector, about, ends
 from artsim.making.solids import Solid, box, cylinder, hull_of, ring, rod, tube, union, vessel
-from artsim.model.kinematics import Array
 
 GAP = 0.0012
 STEEL = 2500.0  # kg/m^3, as walls are thicker than real ones
@@ -52,7 +51,7 @@ def build(draws: Draws) -> Assembly:
             across = ends((side * (half + GAP), side * (half + GAP + 0.006)))
             lug = hull_of(rod(x, across, z, r, sections=16), box(about(x, r), across, (height - 0.02, height)))
             assembly.body += lug + box((radius - wall, x), across, (height - 0.02, height - 0.008))
-        joint = revolute("pot", SIDE, (x, 0, z), 0.0, np.deg2rad(draws.degrees("lid_angle", (80, 105))))
+        joint = revolute("pot", SIDE, (x, 0, z), 0.0, draws.turn("lid_angle", (80, 105)))
     else:
         # Cubed, as lids of real files rise by 1 % of the diagonal, those in use by half.
         share = draws.number("lid_travel", (0.15, 1.0))
@@ -85,8 +84,7 @@ def _handles(draws: Draws, radius: float, height: float, hinged: bool) -> Solid:
         solid = _stick(draws, radius, z)
         if draws.chance("second_handle", 0.3):
             solid += _short(draws.within("second"), "bow", radius, z).turned(UP, np.pi)
-        angles = {"front": 0.0, "left": -0.5 * np.pi}
-        return solid.turned(UP, angles[draws.pick("handle_at", list(angles))])
+        return solid.turned(UP, draws.one_of("handle_at", {"front": 0.0, "left": -0.5 * np.pi}))
     kind = draws.pick("handle", {"bow": 0.45, "ear": 0.25, "bar": 0.3})
     one = _short(draws, kind, radius, z).turned(UP, 0.5 * np.pi)
     return one + one.mirrored(1)

@@ -15,9 +15,8 @@ from artsim.families.clearance import Link, narrow_limits
 from artsim.families.standing_lamp import spotlight, standing
 from artsim.making.assembly import Assembly, continuous, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import SIDE, UP
+from artsim.making.outlines import SIDE, UP, Array
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, revolved, rod, tube, union
-from artsim.model.kinematics import Array
 from artsim.model.transforms import rotation_about
 
 GAP = 0.001
@@ -26,7 +25,7 @@ GAP = 0.001
 def build(draws: Draws) -> Assembly:
     """A lamp; what leans, leans forward to -X at rest."""
     makers = {"desk": _desk, "standing": standing, "spotlight": spotlight}
-    return makers[draws.pick("kind", {"desk": 0.5, "standing": 0.32, "spotlight": 0.18})](draws)
+    return draws.one_of("kind", makers, (0.5, 0.32, 0.18))(draws)
 
 
 def _desk(draws: Draws) -> Assembly:
@@ -79,8 +78,8 @@ def _links(draws: Draws) -> tuple[list[Link], Solid, Array | None]:
         if k == 0:  # stay clear of the base's disc
             lower, upper = np.deg2rad(-62) - angle, np.deg2rad(62) - angle
         else:
-            lower = -np.deg2rad(draws.degrees(f"{name}_forward", (50.0, 85.0)))
-            upper = np.deg2rad(draws.degrees(f"{name}_backward", (50.0, 85.0)))
+            lower = -draws.turn(f"{name}_forward", (50.0, 85.0))
+            upper = draws.turn(f"{name}_backward", (50.0, 85.0))
         links.append(Link(name, revolute(links[-1].name, SIDE, hinge, lower, upper)))
         length = draws.length(f"{name}_length", (0.2, 0.36)) * (0.75 if len(names) == 3 else 1.0)
         if k == 0 and foot is not None:  # the rod stays within this distance
@@ -167,7 +166,7 @@ def _shade(draws: Draws, links: list[Link], at: Array, side: float, arm_angle: f
     # Seen from its knuckle the shade takes up this angle to either side; the arm takes some as well.
     keep = float(arctan2(outline[:, 0], stem + outline[:, 1]).max()) + arcsin(min((r + 0.003) / stem, 1.0)) + 0.05
     # Down and forward, measured from the arm.
-    room = np.deg2rad(draws.degrees("shade_angle", (-180.0, -140.0))) - arm_angle - np.pi
+    room = draws.turn("shade_angle", (-180.0, -140.0)) - arm_angle - np.pi
     room = max(room % (2.0 * np.pi), keep + 0.1)
     along = _lean(arm_angle + np.pi + room)
 

@@ -59,7 +59,7 @@ def build(draws: Draws) -> Assembly:
     shape = _Shape(draws)
     laptop = Assembly("base", _propped(draws, shape) if shape.tilt else _base(draws, shape), 1400.0)
     far = draws.chance("opens_far", 0.9)
-    opening = np.deg2rad(draws.degrees("lid_angle", (88.0, 180.0) if far else (42.0, 88.0)))
+    opening = draws.turn("lid_angle", (88.0, 180.0) if far else (42.0, 88.0))
     hinge = revolute("base", (0, 1, 0), (shape.hinge_x, 0, shape.hinge_z), 0.0, opening)
     laptop.add("lid", _lid(draws, shape) + _hinges(draws, shape), hinge)
     return laptop

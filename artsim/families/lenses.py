@@ -5,9 +5,8 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, Vector, turns
+from artsim.making.outlines import FRONT, Array, Vector, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, ring
-from artsim.model.kinematics import Array
 
 DENSITY = 900.0
 

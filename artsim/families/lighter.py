@@ -10,17 +10,16 @@ from artsim.common.elementary import arctan2, cos, sin
 from artsim.families.details import cheeks
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import SIDE, about, ends, lifted, superellipse
+from artsim.making.outlines import SIDE, Array, about, ends, lifted, superellipse
 from artsim.making.solids import Solid, box, cylinder, deferred, frame, hull, hull_of, loft, ring, rod, tube, union
-from artsim.model.kinematics import Array
 
 GAP = 0.0005
 
 
 def build(draws: Draws) -> Assembly:
     """A lighter that stands upright; what one presses or opens is towards -X at its top."""
-    kind = draws.pick("kind", {"pocket": 0.36, "disposable": 0.3, "long": 0.22, "table": 0.12})
-    return {"pocket": _pocket, "disposable": _disposable, "long": _long, "table": _table}[kind](draws)
+    makers = {"pocket": _pocket, "disposable": _disposable, "long": _long, "table": _table}
+    return draws.one_of("kind", makers, (0.36, 0.3, 0.22, 0.12))(draws)
 
 
 @deferred
@@ -36,7 +35,7 @@ def _spark_wheel(center: Array, radius: float, half: float, notched: bool) -> So
 def _outline(draws: Draws, half_x: float, half_y: float) -> Array:
     """(N, 2) cross-section: oval, rounded rectangle or with a round front."""
     round_, square = draws.number("round_section", (2.2, 4.0)), draws.number("square_section", (5.0, 12.0))
-    power = {"oval": 2.0, "round": round_, "square": square}[draws.pick("section", ["oval", "round", "square"])]
+    power = draws.one_of("section", {"oval": 2.0, "round": round_, "square": square})
     return superellipse(power, half_x, half_y, 20)
 
 
@@ -180,7 +179,7 @@ def _long(draws: Draws) -> Assembly:
             [(-0.8 * half_x, 0, slot_low - 0.006), low, high, (-0.75 * half_x, 0, slot_high + 0.01)], 0.002, 10
         )
     radius = min(neck * half_x, neck * half_y, draws.length("nozzle_radius", (0.0035, 0.006)))
-    lean = draws.angle("nozzle_bend", (0.0, 0.5)) * (draws.pick("nozzle", ["straight", "bent"]) == "bent")
+    lean = draws.one_of("nozzle", {"straight": 0.0, "bent": draws.angle("nozzle_bend", (0.0, 0.5))})
     mouth = [-0.7 * nozzle * sin(lean), 0, handle + (0.3 + 0.7 * cos(lean)) * nozzle]
     path = np.array([[0, 0, slot_high + 0.002], [0, 0, handle + 0.3 * nozzle], mouth])
     tip = path[2] - path[1]

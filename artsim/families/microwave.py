@@ -10,9 +10,8 @@ from artsim.common.elementary import cos, sin
 from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import turns
+from artsim.making.outlines import Array, turns
 from artsim.making.solids import Solid, box, posts, rod, tray, union
-from artsim.model.kinematics import Array
 
 GAP = 0.0015
 

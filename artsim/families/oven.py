@@ -10,12 +10,11 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.common.elementary import arctan2
-from artsim.families.details import dial, front_handle, push_button, side_hinge, windowed_panel, wire_shelf
+from artsim.families.details import add_push_button, dial, front_handle, side_hinge, windowed_panel, wire_shelf
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, UP, Vector, about
+from artsim.making.outlines import FRONT, UP, Array, Vector, about
 from artsim.making.solids import Solid, box, frame, posts, rod, tray, union
-from artsim.model.kinematics import Array
 
 GAP = 0.002
 
@@ -114,8 +113,8 @@ def _cooktop(draws: Draws) -> Assembly:
     cooktop = Assembly()
     cooktop.add("body", body, density=350.0)
     reach = draws.length("knob_reach", (0.015, 0.035))
-    clockwise = draws.pick("knob_turns", ["clockwise", "counterclockwise"]) == "clockwise"
-    _add_knobs(cooktop, feet, UP, (0, 0, -1) if clockwise else UP, reach, radius, draws.chance("knob_stops", 0.25))
+    axis = draws.one_of("knob_turns", {"clockwise": (0, 0, -1), "counterclockwise": (0, 0, 1)})
+    _add_knobs(cooktop, feet, UP, axis, reach, radius, draws.chance("knob_stops", 0.25))
     return cooktop
 
 
@@ -188,7 +187,7 @@ def _hinge(draws: Draws, low: Array, high: Array, sideways: bool, grip: float, r
     """Hinge at the side, or along the lower front edge; its handle must not sink by ``reach`` onto a door below."""
     if sideways:
         left = draws.chance("hinge_left", 0.5)
-        upper = np.deg2rad(draws.degrees("door_angle", (85.0, 130.0)))
+        upper = draws.turn("door_angle", (85.0, 130.0))
         return side_hinge(0.0, high[1] if left else low[1], upper, left)
     level = draws.chance("door_opens_level", 0.7)
     upper = np.deg2rad(90.0 if level else draws.degrees("door_angle", (75.0, 90.0)))
@@ -226,6 +225,4 @@ def _controls(draws: Draws, oven: Assembly, half: float, face: float, z: float, 
     _add_knobs(oven, [(face, y, z) for y in ys.tolist()], FRONT, FRONT, reach, radius, stops)
     if count < 4 and draws.chance("buttons_between", 0.5) and 0.5 * gap - radius > 0.011:
         for number, y in enumerate((0.5 * (ys[:-1] + ys[1:])).tolist(), 1):
-            point = (face, y, z)
-            button = push_button(point, (0.018, 0.012), 0.003)
-            oven.add(f"button_{number}", button, prismatic("body", (1, 0, 0), 0.0, 0.0015, point))
+            add_push_button(oven, number, (face, y, z), (0.018, 0.012), 0.003)

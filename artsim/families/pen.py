@@ -13,9 +13,8 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute, screw
 from artsim.making.draws import Draws
-from artsim.making.outlines import UP
+from artsim.making.outlines import UP, Array
 from artsim.making.solids import Solid, box, hull, loft, union
-from artsim.model.kinematics import Array
 
 GAP = 0.0004
 _ROUND = 16  # sides of a barrel that looks round

@@ -20,11 +20,10 @@ GAP = 0.0005
 
 def build(draws: Draws) -> Assembly:
     """A telephone; closed, its handset in place and no key pressed at rest."""
-    kinds = {"bar": 0.15, "flip": 0.17, "slider": 0.12, "swivel": 0.07, "fold": 0.08, "smartphone": 0.1,
-             "cordless": 0.11, "desk": 0.2}  # fmt: skip
     phone = Assembly(density=1300.0)
-    {"bar": _bar, "flip": _flip, "slider": _slider, "swivel": _swivel, "fold": _fold, "smartphone": _smartphone,
-     "cordless": _cordless, "desk": desk_set}[draws.pick("kind", kinds)](draws, phone)  # fmt: skip
+    makers = {"bar": _bar, "flip": _flip, "slider": _slider, "swivel": _swivel, "fold": _fold,
+              "smartphone": _smartphone, "cordless": _cordless, "desk": desk_set}  # fmt: skip
+    draws.one_of("kind", makers, (0.15, 0.17, 0.12, 0.07, 0.08, 0.1, 0.11, 0.2))(draws, phone)
     return phone
 
 
@@ -86,8 +85,8 @@ def _aerial(draws: Draws, phone: Assembly, half: float, x: float, length: float,
     y, z = side * (half + radius + 0.002), 0.93 * length  # clear of keys on the edge
     stalk = rod(x, y, (z, z - length * draws.number("antenna_length", (0.4, 0.85))), radius, sections=12)
     stalk += rod(x, (y - side * radius, y + 0.5 * side * radius), z, 1.4 * radius, sections=14)
-    way = {"back": -1.0, "front": 1.0}[draws.pick("antenna_way", ["back", "front"])]
-    turn = revolute("body", (0, way, 0), (x, y, z), 0.0, draws.angle("antenna_angle", (1.6, 3.14)))
+    axis = (0, draws.one_of("antenna_way", {"back": -1.0, "front": 1.0}), 0)
+    turn = revolute("body", axis, (x, y, z), 0.0, draws.angle("antenna_angle", (1.6, 3.14)))
     phone.add("antenna", stalk, turn, density=2000.0)
 
 
@@ -224,7 +223,7 @@ def _smartphone(draws: Draws, phone: Assembly) -> None:
     if draws.chance("camera", 0.7):  # its bump
         deep = (0.5 * thick, thick + draws.length("camera_height", (0.0008, 0.004)))
         size = draws.number("camera_width", (0.15, 0.45)) * half
-        y = {"middle": 0.0, "side": 0.45}[draws.pick("camera_place", ["middle", "side"])] * half
+        y = draws.one_of("camera_place", {"middle": 0.0, "side": 0.45}) * half
         bump = box(deep, about(y, size), about(0.88 * length - size, size), fillet=0.5 * size, axis=0, steps=2)
         body += bump.called("glass", -FRONT)
     phone.add("body", body, density=1800.0)

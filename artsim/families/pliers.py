@@ -9,9 +9,8 @@ import numpy as np
 from artsim.common.elementary import power, sin
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import normals, strips
+from artsim.making.outlines import Array, normals, strips
 from artsim.making.solids import Solid, box, cylinder, deferred, hull_of, loft, prism, rod, union
-from artsim.model.kinematics import Array
 
 GAP = 0.0006
 
@@ -52,7 +51,7 @@ def build(draws: Draws) -> Assembly:
                 solid += box((x - 0.0006, x + 0.0006), (-side * 0.3 * GAP, -side * 0.003), (0.1 * thick, 0.9 * thick))
         face, outward = (0.0, -1) if k == 0 else (thick, 1)
         solid += rod(0, 0, (face - 0.001 * outward, face + 0.001 * outward), rivet, 0.85 * rivet)
-        angle = np.deg2rad(draws.degrees("lever_angle", (25, 60))) if k else 0.0
+        angle = draws.turn("lever_angle", (25, 60)) if k else 0.0
         joint = revolute("lever_1", (0, 0, -1), (0, 0, thick / 2), 0.0, angle) if k else None
         pliers.add(name, solid, joint, label="lever", density=6000.0)
     return pliers

@@ -12,9 +12,8 @@ from artsim.families.details import drawn_from
 from artsim.families.keys import add_buttons, front_face, key_cells, key_outline, top_face
 from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, about, lifted, rounded_rectangle
+from artsim.making.outlines import FRONT, Array, about, lifted, rounded_rectangle
 from artsim.making.solids import Solid, box, hull, posts, prism, rod, tray, union
-from artsim.model.kinematics import Array
 
 GAP = 0.002
 SHELF = 0.005

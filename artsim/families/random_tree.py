@@ -164,7 +164,7 @@ def _motion(draws: Draws, branch: _Branch, siblings: list[_Motion]) -> _Motion:
     extent = float((bounds[1] - bounds[0]).max())
     axis, origin = np.array([0.0, 0.0, 1.0]), np.zeros(3)
     if branch.hinge_height is not None:
-        axis = np.eye(3)[{"x": 0, "y": 1}[draws.pick("hinge_axis", ["x", "y"])]]
+        axis = np.eye(3)[draws.one_of("hinge_axis", {"x": 0, "y": 1})]
         origin = np.array([0.0, 0.0, branch.hinge_height])
         lower, upper = -draws.angle("hinge_lower", (0.0, 1.3)), draws.angle("hinge_upper", (0.3, 1.3))
         return _Motion("revolute", axis, origin, lower, upper)

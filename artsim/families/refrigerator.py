@@ -11,9 +11,8 @@ import numpy as np
 from artsim.families.details import front_handle, rounded_shell, side_hinge
 from artsim.making.assembly import Assembly, prismatic
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, about
+from artsim.making.outlines import FRONT, Array, about
 from artsim.making.solids import Solid, box, frame, posts, tray, union
-from artsim.model.kinematics import Array
 
 GAP = 0.003
 Front = tuple[float, float, float, float, float]
@@ -25,8 +24,7 @@ class Style:
 
     def __init__(self, draws: Draws) -> None:
         self.thick = draws.length("door_thickness", (0.03, 0.075), (0.008, 0.075), tails=0.15)
-        radius = draws.length("edge_radius", (0.005, 0.025))
-        self.corner = radius if draws.pick("edges", ["sharp", "round"]) == "round" else 0.003
+        self.corner = draws.one_of("edges", {"sharp": 0.003, "round": draws.length("edge_radius", (0.005, 0.025))})
         self.wall = draws.length("wall", (0.035, 0.06))  # of the body
         # How far the bins reach into the body.
         self.bins = draws.length("bin_depth", (0.06, 0.1)) if draws.chance("door_bins", 0.7) else 0.0
@@ -67,7 +65,7 @@ def build(draws: Draws) -> Assembly:
 
     fridge = Assembly("body", _body(draws, half, depth, foot, top, style, fronts, small), 120.0)
     fridge.record(handles=style.handle != "none")
-    opening = np.deg2rad(draws.degrees("door_angle", (85.0, 180.0)))
+    opening = draws.turn("door_angle", (85.0, 180.0))
     doors = drawers = 0
     dispenser = broad and draws.chance("dispenser", 0.5)
     for side, right, left, low, high in fronts:

@@ -11,9 +11,8 @@ from artsim.families.details import dial
 from artsim.families.keys import Face, add_buttons, add_key, front_face, key, key_cells, key_outline, pill
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import cross_sections
+from artsim.making.outlines import Array, cross_sections
 from artsim.making.solids import Solid, box, deferred, loft, ring, rod
-from artsim.model.kinematics import Array
 
 GAP = 0.0005
 MOST_KEYS = 34

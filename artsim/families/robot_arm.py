@@ -13,9 +13,8 @@ from artsim.common.products import apply, matmul
 from artsim.families.clearance import Link, narrow_limits
 from artsim.making.assembly import Assembly, JointSpec, prismatic, revolute, swivel
 from artsim.making.draws import Draws
-from artsim.making.outlines import Span, rounded_rectangle
+from artsim.making.outlines import Array, Span, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, hull, hull_of, ring, union
-from artsim.model.kinematics import Array
 from artsim.model.transforms import rotation_about
 
 GAP = 0.0015
@@ -165,7 +164,7 @@ def _arm(chain: _Chain, reach: float, kinds: str) -> None:
                 length = max(length, reach * draws.number("roll_length", (0.14, 0.22)))
             chain.limb(length, thin if following else chain.radius)
         elif kind == "P":
-            limit = np.deg2rad(draws.degrees("bend_angle", (95, 150)))
+            limit = draws.turn("bend_angle", (95, 150))
             chain.bend(angles[bend], thin, (-limit * draws.number("bend_back", (0.6, 1.0)), limit))
             bend += 1
             if bend <= long_limbs:
@@ -237,8 +236,8 @@ def _scara(chain: _Chain, reach: float, kinds: str) -> None:
     chain.side, chain.same_side = 1.0, True
     bends = kinds.count("P")
     for k in range(bends):
-        limit = np.deg2rad(draws.degrees("bend_angle", (100, 150)))
-        angle = np.deg2rad(draws.degrees("rest_angle", (-60, 60))) if k else 0.0
+        limit = draws.turn("bend_angle", (100, 150))
+        angle = draws.turn("rest_angle", (-60, 60)) if k else 0.0
         chain.bend(angle, chain.radius * draws.number("joint_taper", (0.85, 0.95)), (-limit, limit))
         length = reach * draws.number("limb_length", (0.55, 0.8)) / bends
         chain.limb(length, chain.radius * draws.number("limb_taper", (0.75, 0.95)), plate=True)

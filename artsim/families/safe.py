@@ -11,9 +11,8 @@ from artsim.common.elementary import cos, hypot, sin
 from artsim.families.details import front_handle, rounded_shell, side_hinge
 from artsim.making.assembly import Assembly, continuous, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, about, turns
+from artsim.making.outlines import FRONT, Array, about, turns
 from artsim.making.solids import Solid, box, ellipsoid, posts, ring, rod, tube, union
-from artsim.model.kinematics import Array
 
 GAP = 0.0015
 
@@ -69,7 +68,7 @@ def build(draws: Draws) -> Assembly:
     # Right back, a door within the walls on a hidden hinge would press its raised board on them.
     free = not shape.inset or shape.barrel > 0
     right_back = free and draws.chance("opens_right_back", 0.15)
-    upper = np.pi if right_back else np.deg2rad(draws.degrees("door_angle", (100.0, 176.0)))
+    upper = np.pi if right_back else draws.turn("door_angle", (100.0, 176.0))
     face = shape.door[0][0]
     front = face - 0.0045  # clear of a raised board
     opener = draws.pick("opener", {"lever": 0.45, "wheel": 0.3, "pull": 0.25})
@@ -101,15 +100,15 @@ def build(draws: Draws) -> Assembly:
             joint = continuous("door", (-1, 0, 0), foot_at)
         else:
             solid = _lever(draws, front, grip_y, grip_z, radius)
-            turn = np.deg2rad(draws.degrees("handle_angle", (45.0, 95.0)))
+            turn = draws.turn("handle_angle", (45.0, 95.0))
             joint = revolute("door", (sign, 0, 0), foot_at, 0.0, turn)
         safe.add("wheel" if opener == "wheel" else "handle", placed(solid), joint, density=3000.0)
     return safe
 
 
 def _body(draws: Draws, s: Shape) -> Solid:
-    corner = draws.length("corner_radius", (0.01, 0.05))
-    corner = min(corner if draws.pick("corners", ["sharp", "round"]) == "round" else 0.004, 0.9 * s.wall)
+    corner = draws.one_of("corners", {"sharp": 0.004, "round": draws.length("corner_radius", (0.01, 0.05))})
+    corner = min(corner, 0.9 * s.wall)
     solid = rounded_shell((0.0, -s.half, s.low), (s.depth, s.half, s.high), s.wall, corner, 3)
     solid += box((s.depth - s.wall, s.depth), s.half - 0.002, (s.low + 0.002, s.high - 0.002), fillet=corner, axis=0)
     inside = s.half - s.wall + 0.002

@@ -14,9 +14,8 @@ from artsim.common.elementary import arcsin, arctan2, cos, hypot, sin, tan
 from artsim.common.products import matmul, norm
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import normals, strips
+from artsim.making.outlines import Array, normals, strips
 from artsim.making.solids import Solid, deferred, ellipsoid, hull, hull_of, loft, prism, rod, tube, union
-from artsim.model.kinematics import Array
 
 GAP = 0.0005
 _POINTS_TO_Y = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -82,7 +81,7 @@ def build(draws: Draws) -> Assembly:
     pivot = width * draws.number("pivot_radius", (0.22, 0.38))
     button = sheet * draws.number("pivot_height", (0.4, 1.0))
 
-    opening = np.deg2rad(draws.degrees("blade_angle", (45.0, 100.0)))
+    opening = draws.turn("blade_angle", (45.0, 100.0))
     middle = sheet + GAP / 2
     blades = []
     for k in range(2):

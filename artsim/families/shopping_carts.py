@@ -5,9 +5,8 @@ import numpy as np
 from artsim.families.wheels import STEEL, Wheels, bar, slab
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, SIDE
+from artsim.making.outlines import FRONT, SIDE, Array
 from artsim.making.solids import Solid, box, rod, tube, union
-from artsim.model.kinematics import Array
 
 
 def shopping_cart(draws: Draws) -> Assembly:

@@ -48,10 +48,10 @@ def build(draws: Draws) -> Assembly:
     stapler = Assembly("base", _base(draws.within("base"), lay, arm_width), 2500.0)
     magazine, arm = _magazine(draws.within("magazine"), lay), _arm(draws.within("arm"), lay, arm_width)
     widest = _opening(arm, lay)
-    wide = min(np.deg2rad(draws.degrees("arm_angle", (80, 125), (80, 206), tails=0.45)), widest)
+    wide = min(draws.turn("arm_angle", (80, 125), (80, 206), tails=0.45), widest)
     axis, origin = (0, 1, 0), (0, 0, lay.hinge)
     if draws.chance("magazine", 0.55):
-        lift = min(np.deg2rad(draws.degrees("magazine_angle", (12, 50))), 0.5 * wide)
+        lift = min(draws.turn("magazine_angle", (12, 50)), 0.5 * wide)
         stapler.add("magazine", magazine, revolute("base", axis, origin, 0.0, lift), density=3500.0)
         stapler.add("arm", arm, revolute("magazine", axis, origin, 0.0, wide - lift), density=2000.0)
     else:

@@ -193,8 +193,7 @@ def _stand(draws: Draws, kind: str, x: float, y: float, height: float, board: fl
         )  # fmt: skip
     furniture.record(legs=True)
     radius, taper = draws.length("leg_radius", (0.012, 0.03)), draws.number("leg_taper", (0.45, 1.0))
-    splay = draws.number("leg_splay", (0.0, 0.25)) * height
-    splay *= draws.pick("legs_stand", ["upright", "splayed"]) == "splayed"
+    splay = draws.one_of("legs_stand", {"upright": 0.0, "splayed": draws.number("leg_splay", (0.0, 0.25)) * height})
     inset = radius + draws.length("leg_inset", (0.0, 0.06))
     sections, legs = draws.pick("leg_sides", [4, 16]), Solid()
     inner_x, inner_y = x - inset, y - inset

@@ -12,17 +12,15 @@ from artsim.common.elementary import arctan2, cos, power, sin
 from artsim.families.details import bow_handle, rounded_tray
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import SIDE, UP, Vector, about, ends, lifted, rounded_rectangle
+from artsim.making.outlines import SIDE, UP, Array, Vector, about, ends, lifted, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, rod, tube, union
-from artsim.model.kinematics import Array
 
 GAP = 0.001
 
 
 def build(draws: Draws) -> Assembly:
     """A trolley, a briefcase or a bag."""
-    kinds = {"trolley": _trolley, "briefcase": _briefcase, "bag": _bag}
-    return kinds[draws.pick("kind", {"trolley": 0.5, "briefcase": 0.3, "bag": 0.2})](draws)
+    return draws.one_of("kind", {"trolley": _trolley, "briefcase": _briefcase, "bag": _bag}, (0.5, 0.3, 0.2))(draws)
 
 
 def _shells(draws: Draws, x: float, y: float, low: float, high: float, seam: float) -> tuple[Solid, Solid]:
@@ -54,7 +52,7 @@ def _trolley(draws: Draws) -> Assembly:
     y, x = 0.5 * draws.length("width", (0.32, 0.52)), 0.5 * draws.length("depth", (0.2, 0.32))
     lift = draws.length("clearance", (0.045, 0.06))
     high = lift + 2 * y * draws.number("height", (1.35, 1.65))
-    seam = {"equal": 0.0, "shallow_lid": -0.45 * x}[draws.pick("shells", ["equal", "shallow_lid"])]
+    seam = draws.one_of("shells", {"equal": 0.0, "shallow_lid": -0.45 * x})
     front, back = _shells(draws, x, y, lift, high, seam)
     side = draws.side("hinge_side")
     hinge_y = side * (y + 0.004)
@@ -91,7 +89,7 @@ def _trolley(draws: Draws) -> Assembly:
                 across = about(s * (y - 0.04) + cheek, 0.004)
                 back += box((wheel_x - 0.02, wheel_x + 0.022), across, (0.022, lift + 0.01))
     case = Assembly("body", back, 300.0)
-    limit = np.deg2rad(draws.degrees("lid_angle", (60.0, 175.0)))
+    limit = draws.turn("lid_angle", (60.0, 175.0))
     case.add("lid", front, revolute("body", (0, 0, -side), (seam, hinge_y, high / 2), 0.0, limit))
     _telescope(draws, case, x, half, lift, high)
     for number, (px, py, parent) in enumerate(places):
@@ -163,7 +161,7 @@ def _briefcase(draws: Draws) -> Assembly:
         back += union(rod(0.6 * x, s * 0.8 * y, (-0.008, 0.003), 0.008, 0.01, 12) for s in (-1, 1))
     case = Assembly("body", back + lugs, 300.0)
     fixed = draws.chance("handle_fixed", 0.35)
-    limit = np.deg2rad(draws.degrees("lid_angle", (45.0, 175.0)))
+    limit = draws.turn("lid_angle", (45.0, 175.0))
     case.add("lid", front, revolute("body", (0, -1, 0), (seam, 0, barrel), 0.0, limit))
     if fixed:
         case.body += handle.called("handle", UP)
@@ -232,7 +230,7 @@ def _bag(draws: Draws) -> Assembly:
     slope = float(arctan2((1.0 - top) * x, 0.88 * z))  # of the sides, which the bails hang down to
     limit = draws.number("handle_swing", (0.55, 1.0)) * (np.pi - 0.15 - slope)
     sides = {"both": (-1.0, 1.0), "front": (-1.0,), "back": (1.0,)}
-    for s in sides[draws.pick("handle_sides", {"both": 0.55, "front": 0.3, "back": 0.15})]:
+    for s in draws.one_of("handle_sides", sides, (0.55, 0.3, 0.15)):
         place = (s * (face + wire + 0.004), 0.0, pivot)
         handle, lugs = _bail(place, half, height, wire, (-s, 0, 0), wire + 0.02)
         bag.body += lugs

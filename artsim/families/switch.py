@@ -11,9 +11,8 @@ import numpy as np
 from artsim.common.elementary import arctan, sin, tan
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, SIDE
+from artsim.making.outlines import FRONT, SIDE, Array
 from artsim.making.solids import Solid, box, deferred, frame, hull_of, rod, union
-from artsim.model.kinematics import Array
 
 GAP = 0.0007
 
@@ -47,7 +46,7 @@ def build(draws: Draws) -> Assembly:
     # The end of a rocker that is pressed in stays before the plate's back.
     room = 0.8 * depth - 0.0028 - 0.3 * min(0.3 * depth, 0.004)
     steepest = arctan(2.0 * room / (0.5 * (cells[0][1, 1] - cells[0][0, 1])))
-    tilt = min(np.deg2rad(draws.degrees("rocker_tilt", (2.0, 8.0))), steepest)
+    tilt = min(draws.turn("rocker_tilt", (2.0, 8.0)), steepest)
     alike = draws.fork("", draws.seed("button_seed") // 2)
     level = draws.chance("rocker_level", 0.35)  # rockers rest in the middle and tip either way
     live = draws.integer("buttons", 1, count) if draws.chance("some_fixed", 0.3) else count

@@ -34,8 +34,8 @@ LEAST_SHARES, MOST_SHARES = (0.105, 0.27, 0.12), (0.79, 0.985, 0.94)
 def build(draws: Draws) -> Assembly:
     """A table, all drawers and doors closed at rest."""
     table = Assembly("body", density=650.0)
-    kinds = {"apron": _apron, "pedestals": _pedestals, "case": _case, "column": _column}
-    kinds[draws.pick("kind", {"apron": 0.36, "pedestals": 0.27, "case": 0.25, "column": 0.12})](draws, table)
+    makers = {"apron": _apron, "pedestals": _pedestals, "case": _case, "column": _column}
+    draws.one_of("kind", makers, (0.36, 0.27, 0.25, 0.12))(draws, table)
     return table
 
 
@@ -116,7 +116,7 @@ def _pedestals(draws: Draws, table: Assembly) -> None:
     table.body += table_top(draws, depth, width, top, height)
     style = _style(draws)
     broad = min(draws.length("pedestal_width", (0.26, 0.5), (0.1, 0.6), tails=0.4), 0.38 * width)
-    sides = PEDESTALS[draws.pick("pedestals", {"right": 0.3, "left": 0.3, "both": 0.4})]
+    sides = draws.one_of("pedestals", PEDESTALS, (0.3, 0.3, 0.4))
     rolling = draws.chance("rolling", 0.1)
     on_legs = not rolling and draws.chance("on_legs", 0.35)
     size = draws.length("leg_width", (0.03, 0.06))
@@ -126,8 +126,7 @@ def _pedestals(draws: Draws, table: Assembly) -> None:
     if on_legs:
         low_z = draws.number("pedestal_bottom", (0.1, 0.5)) * height
     elif not rolling:
-        plinth = draws.length("plinth_height", (0.03, 0.12))
-        low_z = plinth if draws.pick("stands_on", ["floor", "plinth"]) == "plinth" else 0.0
+        low_z = draws.one_of("stands_on", {"floor": 0.0, "plinth": draws.length("plinth_height", (0.03, 0.12))})
     broad = min(broad, outer - 0.1) if len(sides) == 2 else broad  # room for knees
     deep = draws.number("pedestal_depth", (0.75, 1.0)) * 2 * x
     recipe, alike = draws.seed("pedestal_pattern"), draws.chance("pedestals_alike", 0.6)
@@ -207,9 +206,8 @@ def _column(draws: Draws, table: Assembly) -> None:
     """A top on a column that turns, tips or rises, on feet, a disc or wheels."""
     height, wide = draws.length("height", (0.45, 1.1)), 0.5 * draws.length("depth", (0.44, 1.2))
     thick = draws.length("top_thickness", (0.015, 0.05))
-    power = {"round": 2.0, "rounded": 4.0, "square": 12.0}[draws.pick("top_corners", ["round", "rounded", "square"])]
-    longer = draws.number("width", (1.0, 2.2))
-    long = wide * (longer if draws.pick("top_shape", ["even", "long"]) == "long" else 1.0)
+    power = draws.one_of("top_corners", {"round": 2.0, "rounded": 4.0, "square": 12.0})
+    long = wide * draws.one_of("top_shape", {"even": 1.0, "long": draws.number("width", (1.0, 2.2))})
     outline = superellipse(power, wide, long, 32)
 
     def slab(z: float) -> Solid:

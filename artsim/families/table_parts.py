@@ -9,9 +9,8 @@ from artsim.families import fronts
 from artsim.families.fronts import Cell, Moving, Style
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import Vector, about
+from artsim.making.outlines import Array, Vector, about
 from artsim.making.solids import Solid, box, cylinder, hull_of, rod, tube, union
-from artsim.model.kinematics import Array
 
 GAP = 0.003
 LEGS = {"square": 0.3, "tapered": 0.22, "round": 0.22, "turned": 0.13, "loops": 0.13}
@@ -78,12 +77,12 @@ def _fill(draws: Draws, cell: Cell, style: Style, doors: float, must_move: bool)
     """What a cell holds."""
     width, height = cell.sides
     if not must_move and draws.chance("still", 0.12):
-        still = {"open": fronts.shelves, "fixed": fronts.fixed}
-        return still[draws.pick("still_front", {"open": 0.7, "fixed": 0.3})](draws, cell, style)
+        still = draws.one_of("still_front", {"open": fronts.shelves, "fixed": fronts.fixed}, (0.7, 0.3))
+        return still(draws, cell, style)
     if height > 0.2 and width > 0.05 and draws.chance("has_door", doors * (1.0 if height > 0.3 else 0.6)):
         if width > 0.42 and draws.chance("door_pair", 0.75):
             pairs = {"hinged": fronts.double_door, "sliding": fronts.sliding_doors}
-            return pairs[draws.pick("pair", {"hinged": 0.85, "sliding": 0.15})](draws, cell, style)
+            return draws.one_of("pair", pairs, (0.85, 0.15))(draws, cell, style)
         hinges = ["left", "right"] if width < 1.3 * height else ["bottom", "top"]
         return fronts.door(draws, cell, style, draws.pick("hinge", hinges))
     if height > 0.65:

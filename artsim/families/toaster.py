@@ -5,12 +5,11 @@ What varies: slots, levers and their guides; box, arch, loaf or block; knobs, bu
 
 import numpy as np
 
-from artsim.families.details import dial, push_button
+from artsim.families.details import add_push_button, dial
 from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, about, rounded_rectangle
+from artsim.making.outlines import FRONT, Array, about, rounded_rectangle
 from artsim.making.solids import Solid, box, deferred, frame, hull_of, posts, prism, rod, tube, union
-from artsim.model.kinematics import Array
 
 GAP = 0.001
 
@@ -46,8 +45,9 @@ def build(draws: Draws) -> Assembly:
     toaster = Assembly()
     places = [-0.5 * half, 0.5 * half]
     if count < 4:
-        aside = draws.number("lever_aside", (-0.35, 0.35))
-        places = [half * (aside if draws.pick("lever_place", ["middle", "aside"]) == "aside" else 0.0)]
+        places = [
+            half * draws.one_of("lever_place", {"middle": 0.0, "aside": draws.number("lever_aside", (-0.35, 0.35))})
+        ]
     top = foot + height * draws.number("lever_height", (0.62, 0.78))
     travel = draws.number("lever_travel", (0.25, 1.0)) * min(0.11, top - foot - 0.055)
     if draws.chance("lever_guide", 0.8):
@@ -137,7 +137,7 @@ def _controls(draws: Draws, toaster: Assembly, places: list[float], half: float,
         spot = (0.0, y, foot + 0.012 + 0.45 * room)
         if draws.chance("knob", 0.8) and radius > 0.006:
             name = f"knob_{number}" if len(places) > 1 else "knob"
-            turn = revolute("body", FRONT, spot, 0.0, np.deg2rad(draws.degrees("knob_angle", (180.0, 290.0))))
+            turn = revolute("body", FRONT, spot, 0.0, draws.turn("knob_angle", (180.0, 290.0)))
             toaster.add(name, dial(spot, FRONT, draws.length("knob_reach", (0.012, 0.02)), radius), turn)
     if len(places) == 1 and draws.chance("button_row", 0.6):
         y = places[0] - 0.6 * half if places[0] >= 0 else places[0] + 0.6 * half
@@ -145,10 +145,8 @@ def _controls(draws: Draws, toaster: Assembly, places: list[float], half: float,
         if abs(y - places[0]) < 0.042:
             return
         for number, z in enumerate(np.linspace(0.0, 0.05, draws.integer("buttons", 1, 3)), 1):
-            face = (0.0, y, foot + 0.03 + z)
-            corner = 0.0045 if draws.pick("button_shape", ["square", "round"]) == "round" else 0.002
-            button = push_button(face, (0.016, 0.009), corner)
-            toaster.add(f"button_{number}", button, prismatic("body", (1, 0, 0), 0.0, 0.0015, face))
+            corner = draws.one_of("button_shape", {"square": 0.002, "round": 0.0045})
+            add_push_button(toaster, number, (0.0, y, foot + 0.03 + z), (0.016, 0.009), corner)
 
 
 def _bun_rack(length: float, half: float, z: float) -> Solid:

@@ -11,9 +11,8 @@ import numpy as np
 
 from artsim.making.assembly import Assembly, JointSpec, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, SIDE, UP, Vector, about, lifted, superellipse
+from artsim.making.outlines import FRONT, SIDE, UP, Array, Vector, about, lifted, superellipse
 from artsim.making.solids import Solid, box, cylinder, frame, hull, hull_of, loft, rod, tray, tube, union
-from artsim.model.kinematics import Array
 
 GAP = 0.002
 _AROUND = 24  # sides of the bowl
@@ -39,7 +38,7 @@ def build(draws: Draws) -> Assembly:
     height = draws.length("bowl_height", (0.34, 0.48))
     squareness = {"ellipse": 2.0, "full": draws.number("bowl_fullness", (2.0, 2.6)),
                   "square": draws.number("bowl_squareness", (3.0, 6.0))}  # fmt: skip
-    power = squareness[draws.pick("bowl", {"ellipse": 0.4, "full": 0.4, "square": 0.2})]
+    power = draws.one_of("bowl", squareness, (0.4, 0.4, 0.2))
     tank = draws.pick("cistern", {"low": 0.7, "high": 0.1, "wall": 0.2})
     hung = tank == "wall" and draws.chance("hung", 0.7)
     cover = _Cover(draws)

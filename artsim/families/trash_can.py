@@ -31,27 +31,28 @@ class Bin:
         self.radius, self.steps = draws.number("corner", (0.015, 0.5)) * min(self.x, self.y), 3
         if draws.chance("round", 0.35):
             self.y, self.radius, self.steps = self.x, 0.999 * self.x, 6
-        taper = draws.number("taper", (0.02, 0.16))
-        self.taper = (taper if draws.pick("sides", ["straight", "tapered"]) == "tapered" else 0.0) * min(self.x, self.y)
+        taper = draws.one_of("sides", {"straight": 0.0, "tapered": draws.number("taper", (0.02, 0.16))})
+        self.taper = taper * min(self.x, self.y)
         self.foot = draws.length("foot_height", (0.02, 0.05))  # height of the base
 
 
 def build(draws: Draws) -> Assembly:
     """A bin, closed at rest."""
-    kind = draws.pick("kind", {"pedal": 0.45, "swing": 0.2, "wheelie": 0.2, "halves": 0.15})
-    if kind == "wheelie":
+    lids = {"pedal": _pedal_bin, "swing": _swinging_flap, "wheelie": None, "halves": _two_lids}
+    add_lid = draws.one_of("kind", lids, (0.45, 0.2, 0.2, 0.15))
+    if add_lid is None:
         return _wheelie(draws)
     size = Bin(draws)
     x, y, top, radius = size.x, size.y, size.height, size.radius
     sides = [(0.0, size.taper), (1.0, 0.0)]
     body = rounded_tray((-x, -y, size.foot), (x, y, top), 0.003, radius, sides, steps=size.steps)
-    out = {"wide": 0.004, "narrow": -0.006}[draws.pick("base", ["wide", "narrow"])] - size.taper
+    out = draws.one_of("base", {"wide": 0.004, "narrow": -0.006}) - size.taper
     body += box(x + out, y + out, (0, size.foot + 0.002), fillet=radius, axis=2, steps=size.steps)
     if draws.chance("collar", 0.5):  # around the opening
         low = (-x - 0.003, -y - 0.003, top - draws.length("collar_height", (0.01, 0.04)))
         body += rounded_tray(low, (x + 0.003, y + 0.003, top), 0.005, radius, floor=0.0, steps=size.steps)
     can = Assembly("body", body, 500.0)
-    {"pedal": _pedal_bin, "swing": _swinging_flap, "halves": _two_lids}[kind](draws, can, size)
+    add_lid(draws, can, size)
     return can
 
 
@@ -61,8 +62,7 @@ def _pedal_bin(draws: Draws, can: Assembly, size: Bin) -> None:
     hinge = (x + 0.013, 0.0, seam)
     half = 0.4 * (size.y - 0.5 * size.radius)
     rise = max(draws.number("lid_rise", (0.08, 0.6), (0.03, 0.8), tails=0.3) * min(size.x, size.y), 0.006)
-    edges = {"sharp": 0.25, "bevelled": 0.7, "domed": 1.0}
-    inset = edges[draws.pick("lid_edge", list(edges))] * rise
+    inset = draws.one_of("lid_edge", {"sharp": 0.25, "bevelled": 0.7, "domed": 1.0}) * rise
     profile = [(0.0, inset), (0.12, 0.45 * inset), (0.5, 0.06 * inset), (1.0, 0.0)]
     lid = rounded_tray((-x - 0.003, -size.y - 0.003, seam), (x + 0.003, size.y + 0.003, seam + rise), 0.003,
                        size.radius, profile, side=-1, steps=size.steps)  # fmt: skip
@@ -126,14 +126,14 @@ def _swinging_flap(draws: Draws, can: Assembly, size: Bin) -> None:
     corner = max(size.radius - rim, 0.002)
     flap = box(x - rim, y - rim, (top - 0.012, top - 0.006), fillet=corner, axis=2, steps=size.steps)
     flap += box(0.006, 0.8 * (y - rim), (top - 0.016, top - 0.011))
-    limit = np.deg2rad(draws.degrees("flap_angle", (40.0, 80.0)))
+    limit = draws.turn("flap_angle", (40.0, 80.0))
     can.add("flap", flap, revolute("body", SIDE, (0, 0, top - 0.009), -limit, limit), label="lid")
 
 
 def _two_lids(draws: Draws, can: Assembly, size: Bin) -> None:
     """Two leaves that turn at the left and the right and meet in the middle."""
     seam, thick = size.height + GAP, draws.length("lid_thickness", (0.006, 0.012))
-    limit = np.deg2rad(draws.degrees("lid_angle", (70.0, 95.0)))
+    limit = draws.turn("lid_angle", (70.0, 95.0))
     whole = box(size.x, size.y, (seam, seam + thick), fillet=size.radius, axis=2, steps=6)
     for s in (1.0, -1.0):
         hinge = s * (size.y + 0.009)
@@ -179,7 +179,7 @@ def _wheelie(draws: Draws) -> Assembly:
     lid += box((x - 0.02, hinge[0]), 0.6 * y, (seam, seam + 0.009))
     lid += rod(hinge[0], (-0.6 * y, 0.6 * y), seam + 0.002, 0.008, sections=12)
     angles = (75.0, 108.0) if draws.chance("lid_stops", 0.6) else (108.0, 205.0)
-    limit = np.deg2rad(draws.degrees("lid_angle", angles))
+    limit = draws.turn("lid_angle", angles)
     over = np.linspace((-0.012, grip_z - 0.02 - seam), (grip_x - hinge[0], grip_z - seam), 8)
     limit = min(limit, _turned_over(shape, 0.012, rise, -0.011, over))
     can.add("lid", lid, revolute("body", SIDE, hinge, 0.0, limit))

@@ -12,9 +12,8 @@ import numpy as np
 from artsim.families.keys import key_outline, sleeve
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, UP, rounded_rectangle
+from artsim.making.outlines import FRONT, UP, Array, rounded_rectangle
 from artsim.making.solids import Solid, box, deferred, hull, hull_of, prism, ring, rod, tube, union
-from artsim.model.kinematics import Array
 
 GAP = 0.0004
 
@@ -38,7 +37,7 @@ _PLUGS = {"A": (0.0135, 0.006, 0.00225), "C": (0.0075, 0.0042, 0.00125), "micro"
 def build(draws: Draws) -> Assembly:
     """A USB stick that lies flat, its connector covered or drawn in at rest."""
     scale = draws.number("scale", (0.75, 1.9))  # novelty sticks are larger than their connectors ask for
-    measures = _PLUGS[draws.pick("plug", {"A": 0.7, "C": 0.2, "micro": 0.1})]
+    measures = draws.one_of("plug", _PLUGS, (0.7, 0.2, 0.1))
     sides = zip(("length", "width", "thickness"), measures, strict=True)
     reach, *plug = (v * scale * draws.number(f"plug_{name}", (0.9, 1.15)) for name, v in sides)
     half = plug[0] * draws.number("width", (1.25, 2.6))
@@ -46,8 +45,7 @@ def build(draws: Draws) -> Assembly:
     stick = _Stick(reach * draws.number("length", (1.1, 4.2)), half, thick, reach, np.array(plug))
     usb = Assembly(density=1200.0)
     kinds = {"capped": _capped, "two_caps": _two_caps, "swivel": _swivel, "sleeve": _sleeved, "retracting": _retracting}
-    kind = draws.pick("kind", dict(zip(kinds, (0.3, 0.1, 0.28, 0.14, 0.18), strict=True)))
-    kinds[kind](draws, usb, stick)
+    draws.one_of("kind", kinds, (0.3, 0.1, 0.28, 0.14, 0.18))(draws, usb, stick)
     return usb
 
 
@@ -94,8 +92,7 @@ def _body(draws: Draws, stick: _Stick, x0: float, x1: float, plain: bool = False
     if kind == "drum":
         rounding = draws.number("drum_rounding", (0.6, 1.0)) * min(half, thick)
         return box((x0, -half, -thick), (x1, half, thick), fillet=rounding, axis=0, steps=4)
-    bevel = draws.number("bevel", (0.2, 0.9))
-    bevel = {"sharp": 0.0, "bevelled": bevel}[draws.pick("edges", ["sharp", "bevelled"])]
+    bevel = draws.one_of("edges", {"sharp": 0.0, "bevelled": draws.number("bevel", (0.2, 0.9))})
     solid = Solid()
     for outline in _outline(draws, kind, x0, x1, half):
         middle = outline.mean(axis=0)
@@ -190,7 +187,7 @@ def _swivel(draws: Draws, usb: Assembly, stick: _Stick) -> None:
     cover += box((pivot - reach - sheet, pivot - reach), wide, (low - sheet, high + sheet))
     for z, out in ((low - sheet, -1.0), (high + sheet, 1.0)):
         cover += rod(pivot, 0, (z - out * 0.5 * sheet, z + out * 0.0006), pin, sections=16)
-    axis = (0, 0, {"left": -1.0, "right": 1.0}[draws.pick("cover_opens", ["left", "right"])])
+    axis = draws.one_of("cover_opens", {"left": (0, 0, -1), "right": (0, 0, 1)})
     if draws.chance("cover_turns_freely", 0.3):
         turn = continuous("body", axis, (pivot, 0, 0))
     else:

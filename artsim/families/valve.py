@@ -29,7 +29,7 @@ def build(draws: Draws) -> Assembly:
     valve = Assembly("body", tube([(0, -half, 0), (0, half, 0)], pipe, 24) + _ends(draws, half, pipe), IRON)
     alike = draws.fork("", [draws.seed("valve_seed") // 2, draws.seed("more_seed") // 2])
     rises = draws.chance("wheel_rises", 0.75)
-    axis = {"down": -1.0, "up": 1.0}[draws.pick("wheel_axis", ["down", "up"])] * UP
+    axis = draws.one_of("wheel_axis", {"down": -UP, "up": UP})
     fixed, moving, top, travel = (_ball_valve if lever else _gate_valve)(alike, pipe, room)
     for k in range(count):
         y = (k - 0.5 * (count - 1)) * spacing

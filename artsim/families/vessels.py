@@ -8,9 +8,8 @@ from numpy.typing import ArrayLike
 
 from artsim.common.elementary import cos, power, sin
 from artsim.making.draws import Draws
-from artsim.making.outlines import UP, about, lifted, turns
+from artsim.making.outlines import UP, Array, about, lifted, turns
 from artsim.making.solids import Solid, box, deferred, ellipsoid, hull_of, loft, ring, rod, tube, union
-from artsim.model.kinematics import Array
 
 GAP = 0.0008
 """Metres between a neck and its cap, and between a stem and its bore: bottles are small."""

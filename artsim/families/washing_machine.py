@@ -7,12 +7,11 @@ console and lid of a top loader; a drum or agitator that turns; feet, plinth, wo
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.families.details import dial, front_handle, holed_plate, push_button, side_hinge
+from artsim.families.details import add_push_button, dial, front_handle, holed_plate, side_hinge
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, UP, about
+from artsim.making.outlines import FRONT, UP, Array, about
 from artsim.making.solids import Solid, box, frame, hull, posts, ring, rod, tray, vessel
-from artsim.model.kinematics import Array
 
 GAP = 0.002
 
@@ -57,8 +56,7 @@ def _front_loader(draws: Draws, s: Shape) -> Assembly:
     body += holed_plate((0, -s.half, s.low), (plate, s.half, strip + 0.001), (0.0, z), hole, 0, 20)
     slot = np.array([box_side * (s.half - box_half - 0.03), 0.5 * (strip + s.high)])
     room = 0.5 * (s.high - strip) - 0.016
-    proud = draws.length("strip_reach", (0.005, 0.02))
-    proud = proud if draws.pick("strip", ["flush", "proud"]) == "proud" else 0.0
+    proud = draws.one_of("strip", {"flush": 0.0, "proud": draws.length("strip_reach", (0.005, 0.02))})
     if drawer:
         widths = [slot[0] - box_half + s.half, s.half - slot[0] - box_half, 0.016, 0.016]
         panel = frame((-proud, -s.half, strip), (plate, s.half, s.high), widths)
@@ -81,7 +79,7 @@ def _front_loader(draws: Draws, s: Shape) -> Assembly:
     outer = hole + draws.length("door_rim", (0.03, 0.055))
     thick = draws.length("door_thickness", (0.025, 0.05))
     door = _porthole(draws, z, hole, outer, thick, bowl)
-    upper = np.deg2rad(draws.degrees("door_angle", (95.0, 160.0)))
+    upper = draws.turn("door_angle", (95.0, 160.0))
     hinge = side_hinge(-GAP - thick, sign * (outer + 0.012), upper, left)
     machine.add("door", door if left else door.mirrored(1), hinge)
     if turning:
@@ -182,11 +180,11 @@ def _top_loader(draws: Draws, s: Shape) -> Assembly:
         lid = box(low, high, fillet=0.008)
     grip = (low[2] + 0.004, high[2] - 0.003)
     if draws.pick("lid_hinge", {"back": 0.65, "side": 0.35}) == "back":
-        upper = np.deg2rad(draws.degrees("lid_angle", (75.0, 89.0)))
+        upper = draws.turn("lid_angle", (75.0, 89.0))
         lid += box((low[0] - 0.012, low[0] + 0.01), 0.07, grip, fillet=0.004).called("handle", FRONT)
         machine.add("lid", lid, revolute("body", (0, 1, 0), (high[0], 0, high[2]), 0.0, upper))
     else:
-        upper = np.deg2rad(draws.degrees("lid_angle", (85.0, 120.0), (40.0, 120.0), tails=0.3))
+        upper = draws.turn("lid_angle", (85.0, 120.0), (40.0, 120.0), tails=0.3)
         side = draws.side("lid_hinge_side")
         x, free = 0.5 * (low[0] + high[0]), -side * high[1]
         lid += box(about(x, 0.06), about(free, 0.01), grip, fillet=0.004).called("handle", (0, -side, 0))
@@ -217,7 +215,7 @@ def _controls(draws: Draws, machine: Assembly, free: tuple[float, float], x: flo
     places = np.linspace(free[0], free[1], 9)[1:-1].tolist()
     reverse = -1 if draws.chance("buttons_from_left", 0.5) else 1
     radius = min(draws.length("knob_radius", (0.022, 0.035)), 0.4 * room)
-    spot = (x, places[{"middle": 3, "right": 1, "left": 5}[draws.pick("knob_place", ["middle", "right", "left"])]], z)
+    spot = (x, places[draws.one_of("knob_place", {"middle": 3, "right": 1, "left": 5})], z)
     reach = draws.length("knob_reach", (0.018, 0.03))
     machine.add("knob", dial(spot, FRONT, reach, radius), continuous("body", FRONT, spot))
     number = 0
@@ -225,7 +223,5 @@ def _controls(draws: Draws, machine: Assembly, free: tuple[float, float], x: flo
         if abs(y - spot[1]) < radius + 0.02 or number >= 4 or draws.chance("button_left_out", 0.4):
             continue
         number += 1
-        face = (x, y, z)
-        corner = 0.006 if draws.pick("button_shape", ["square", "round"]) == "round" else 0.002
-        button = push_button(face, (0.016, 0.012), corner)
-        machine.add(f"button_{number}", button, prismatic("body", (1, 0, 0), 0.0, 0.0015, face))
+        corner = draws.one_of("button_shape", {"square": 0.002, "round": 0.006})
+        add_push_button(machine, number, (x, y, z), (0.016, 0.012), corner)

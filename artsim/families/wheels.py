@@ -7,9 +7,8 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, continuous
 from artsim.making.draws import Draws, Interval
-from artsim.making.outlines import UP, Vector, about, ends, turns
+from artsim.making.outlines import UP, Array, Vector, about, ends, turns
 from artsim.making.solids import Solid, box, cylinder, hull_of, ring, rod, tube
-from artsim.model.kinematics import Array
 
 GAP = 0.003
 STEEL = 1500.0  # kg/m^3, as real tubes are hollow

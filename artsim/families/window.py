@@ -10,9 +10,8 @@ from artsim.families.details import bar_handle, grid_panel, swing_limits
 from artsim.families.fronts import HINGES
 from artsim.making.assembly import Assembly, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, SIDE, UP, about
+from artsim.making.outlines import FRONT, SIDE, UP, Array, about
 from artsim.making.solids import Solid, box, cylinder, frame
-from artsim.model.kinematics import Array
 
 GAP = 0.003
 PANE = 0.006
@@ -89,7 +88,7 @@ def _hinged(
     edges = np.linspace(-width / 2, width / 2, count + 1)
     sideways = draws.chance("hinged_at_side", 0.65) or meeting
     own = draws.pick("hinge", ["left", "right"] if sideways else ["top", "top", "bottom"])
-    limit = np.deg2rad(draws.degrees("sash_angle", (40.0, 178.0) if sideways else (20.0, 75.0)))
+    limit = draws.turn("sash_angle", (40.0, 178.0) if sideways else (20.0, 75.0))
     ajar = draws.number("open_share", (0.1, 0.6)) if draws.chance("ajar", 0.25) else 0.0
     one_fixed = count > 1 and not meeting and draws.chance("one_fixed", 0.35)
     fixed = draws.integer("fixed_light", 0, count - 1) if one_fixed else -1

@@ -141,6 +141,10 @@ class Draws:
         """A :meth:`number` of degrees."""
         return self.number(name, usual, widest, tails=tails, unit="deg")
 
+    def turn(self, name: str, usual: Interval, widest: Interval | None = None, *, tails: float = 0.25) -> float:
+        """Radians that are drawn in :meth:`degrees`."""
+        return float(np.deg2rad(self.degrees(name, usual, widest, tails=tails)))
+
     def log_length(self, name: str, middle: float, low: float, high: float) -> float:
         """Metres whose logarithm is drawn evenly: from ``middle * exp(low)`` to ``middle * exp(high)``."""
         value = middle * exp(self.rng.uniform(low, high))
@@ -204,9 +208,13 @@ class Draws:
         self._keep(key, Draw(_text(chosen), "choice", options=names))
         return chosen
 
+    def one_of(self, name: str, options: Mapping[Any, Choice], chances: Sequence[float] | None = None) -> Choice:
+        """What one of several names stands for: :meth:`pick` among the names, each with its chance."""
+        return options[self.pick(name, dict(zip(options, chances, strict=True)) if chances else list(options))]
+
     def side(self, name: str) -> float:
         """1.0 for the left or -1.0 for the right of someone who looks at the front: a sign of Y."""
-        return 1.0 if self.pick(name, ["right", "left"]) == "left" else -1.0
+        return self.one_of(name, {"right": -1.0, "left": 1.0})
 
     def seed(self, name: str) -> int:
         """A seed for :meth:`fork`."""

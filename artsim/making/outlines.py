@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from artsim.common.elementary import cos, sin
 from artsim.common.elementary import power as raised
 from artsim.common.products import cross, unit
-from artsim.model.kinematics import Array
+from artsim.model.kinematics import Array as Array
 
 Vector = Sequence[float] | Array
 FRONT = np.array([-1.0, 0.0, 0.0])
