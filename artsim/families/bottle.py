@@ -71,8 +71,7 @@ def _body(draws: Draws, shape: str, wide: bool, tall: float) -> tuple[Solid, Mou
         radius = 0.34 * small
     levels = [(z * height, x * depth, x * half, r) for z, x, r in _profile(draws, shape)]
     lead, last = 1.15 * radius, levels[-1]
-    rise = 0.004 if slender else draws.number("shoulder_rise", (0.1, 0.5)) * small
-    foot = height + rise
+    foot = height + (0.004 if slender else draws.number("shoulder_rise", (0.1, 0.5)) * small)
     levels.append((foot, min(lead, last[1]), min(lead, last[2]), 1.0))
     if slender or draws.chance("long_neck", 0.12):
         foot += draws.number("neck_length", (0.5, 2.2)) * half

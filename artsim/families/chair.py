@@ -72,8 +72,7 @@ def build(draws: Draws) -> Assembly:
     joint = continuous("piston" if lifted else "base", UP, (0, 0, low))
     chair.add("seat", seat if tilting else seat + rest, joint, density=400.0)
     if tilting:
-        tilt = draws.turn("back_angle", (12, 28))
-        chair.add("back", rest, revolute("seat", SIDE, hinge, 0.0, tilt), density=400.0)
+        chair.add("back", rest, revolute("seat", SIDE, hinge, 0.0, draws.turn("back_angle", (12, 28))), density=400.0)
     if arms == "sliding":
         _sliding_arms(draws, chair, depth, width, top)
     _controls(draws, chair, low)
@@ -179,8 +178,7 @@ def _back(draws: Draws, width: float, top: float, hinge: Array) -> Solid:
     lean = draws.angle("back_lean", (0.05, 0.2))
     x = hinge[0] + 0.025
     solid = rod(hinge[0], (-0.028, 0.028), hinge[2], 0.012, sections=16)
-    path = np.array([[*hinge], [x + 0.02, 0, hinge[2] + 0.01], [x + 0.03, 0, low + 0.3 * tall]])
-    solid += tube(path, 0.016, 10)
+    solid += tube(np.array([[*hinge], [x + 0.02, 0, hinge[2] + 0.01], [x + 0.03, 0, low + 0.3 * tall]]), 0.016, 10)
     corner = min(half, 0.5 * tall) * draws.number("back_corner", (0.2, 0.7))
     if draws.chance("upholstered", 0.7):
         outer = box((x, x + thick), half, (low, low + tall), fillet=corner, axis=0, steps=4)

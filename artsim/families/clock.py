@@ -92,8 +92,7 @@ def _knobs(draws: Draws, clock: Assembly, x: float, spread: float) -> None:
         r = draws.length("knob_radius", (0.6, 1.0), of=0.35 * spread)
         knob = rod((x + GAP, x + GAP + 0.5 * r), y, z, 0.5 * r, sections=10)
         knob += box((x + GAP + 0.4 * r, x + GAP + 1.4 * r), about(y, r), about(z, 0.25 * r), fillet=0.2 * r)
-        name = f"knob_{k}" if count > 1 else "knob"
-        clock.add(name, knob, continuous("body", (1, 0, 0), (x, y, z)), density=DENSITY)
+        clock.add(f"knob_{k}" if count > 1 else "knob", knob, continuous("body", (1, 0, 0), (x, y, z)), density=DENSITY)
 
 
 def _longcase_clock(draws: Draws) -> Assembly:
@@ -235,6 +234,5 @@ def _watch(draws: Draws) -> Assembly:
         lid = rod((edge, edge - 0.12 * radius), 0, 0, half, 0.85 * half, 30)
         left = draws.chance("lid_hinged_left", 0.5)
         y = half * (1.0 if left else -1.0)
-        joint = side_hinge(edge - 0.06 * radius, 1.02 * y, draws.angle("lid_angle", (1.2, 2.2)), left)
-        clock.add("lid", lid, joint)
+        clock.add("lid", lid, side_hinge(edge - 0.06 * radius, 1.02 * y, draws.angle("lid_angle", (1.2, 2.2)), left))
     return clock

@@ -130,5 +130,4 @@ def glass_door(
     left = draws.chance("hinged_left", 0.5)
     edge, y = (across[1], across[0] + 0.5 * bar) if left else (across[0], across[1] - 0.5 * bar)
     door += rod((low[0] + 0.001, low[0] - 0.01), y, middle, 0.3 * bar, sections=12).called("knob", FRONT)
-    joint = side_hinge(low[0], edge, draws.angle("angle", (1.0, 2.0)), left)
-    clock.add("door", door, joint, density=DENSITY)
+    clock.add("door", door, side_hinge(low[0], edge, draws.angle("angle", (1.0, 2.0)), left), density=DENSITY)

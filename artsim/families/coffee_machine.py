@@ -68,11 +68,9 @@ def _espresso(draws: Draws) -> Assembly:
     # The portafilter turns away from the wand.
     group_x, group_y, top = group[0], group[1], group[2] - 0.014 - GAP
     basket = rod(group_x, group_y, (top - 0.03, top), 0.029, 0.034)
-    reach = draws.length("portafilter_length", (0.09, 0.13))
-    neck, end = group_x - 0.03, group_x - 0.035 - reach
+    neck, end = group_x - 0.03, group_x - 0.035 - draws.length("portafilter_length", (0.09, 0.13))
     path = [(group_x, top - 0.012), (neck, top - 0.014), (neck - 0.03, top - 0.016), (end, top - 0.022)]
-    grip = tube([(a, group_y, b) for a, b in path], [0.007, 0.007, 0.011, 0.013])
-    basket += grip.called("handle", FRONT)
+    basket += tube([(a, group_y, b) for a, b in path], [0.007, 0.007, 0.011, 0.013]).called("handle", FRONT)
     if top - 0.03 - base > 0.05:
         basket += union(
             cylinder((group_x, group_y + s * 0.012, top - 0.045), (group_x, group_y, top - 0.028), 0.005, 0.007, 10)
@@ -200,8 +198,7 @@ def _percolator(draws: Draws) -> Assembly:
         lid += rod(0, 0, (seam - draws.length("lid_plug", (0.004, 0.02)), seam + 0.001), 0.45 * radius, 0.75 * radius)
         joint = prismatic("body", UP, 0.0, draws.number("lid_travel", (0.02, 0.8)) * tall, (0, 0, seam))
     else:
-        limit = draws.turn("lid_angle", (60.0, 110.0))
-        joint = revolute("body", (0, 1, 0), (radius + 0.004, 0.0, seam), 0.0, limit)
+        joint = revolute("body", (0, 1, 0), (radius + 0.004, 0.0, seam), 0.0, draws.turn("lid_angle", (60.0, 110.0)))
     machine.add("lid", lid, joint)
     return machine
 
@@ -270,8 +267,7 @@ def _urn(draws: Draws) -> Assembly:
     x = 0.5 * draws.length("depth", (0.14, 0.3))
     y = x * (1.0 if draws.chance("width_as_depth", 0.5) else draws.number("width_share", (0.7, 1.35)))
     height = draws.length("height", (1.1, 2.9), of=2 * x)
-    corner = draws.number("corner_radius", (0.1, 0.6))
-    radius = min(x, y) * draws.one_of("outline", {"round": 0.999, "square": corner})
+    radius = min(x, y) * draws.one_of("outline", {"round": 0.999, "square": draws.number("corner_radius", (0.1, 0.6))})
     niche = draws.pick("front", {"niche": 0.5, "tap": 0.5}) == "niche"
     if niche:  # a foot, a column at the back, and a head
         foot, head = 0.09 * height, draws.number("head_height", (0.35, 0.6)) * height
@@ -315,8 +311,7 @@ def _urn(draws: Draws) -> Assembly:
         hinge, half = (side_x + 0.006, 0.0, seam + 0.002), 0.3 * side_y
         lid += box((side_x - 0.3 * x, hinge[0]), half, (seam, seam + 0.004))
         lid += rod(hinge[0], (-half, half), hinge[2], 0.002, sections=10)
-        limit = draws.turn("lid_angle", (60.0, 110.0))
-        joint = revolute("body", (0, 1, 0), hinge, 0.0, limit)
+        joint = revolute("body", (0, 1, 0), hinge, 0.0, draws.turn("lid_angle", (60.0, 110.0)))
     machine.add("lid", lid, joint)
     if niche and draws.chance("controls", 0.6):
         _controls(draws, machine, -x, y - radius, height - head, height)

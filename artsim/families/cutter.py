@@ -83,13 +83,10 @@ def _body(draws: Draws, c: _Case) -> Solid:
     solid = prism(plan, 0.12 * height, c.channel - GAP) + prism(plan * (0.99, 0.86), 0.0, 0.2 * height)
     for side in (-1, 1):
         inside = np.array([(back, c.inner), (front + mouth * (side < 0), c.inner)])
-        wall_outline = np.concatenate([outer, inside]) * (1, side)
-        solid += prism(wall_outline, 0.12 * height, 0.88 * height)
+        solid += prism(np.concatenate([outer, inside]) * (1, side), 0.12 * height, 0.88 * height)
         lip = np.array([(front + c.nose, c.slot + GAP), (back, c.slot + GAP)])
-        lip_outline = np.concatenate([outer, lip]) * (1, side)
-        solid += prism(lip_outline, c.roof, 0.9 * height)
-        crown = np.concatenate([outer * (0.99, 0.86), lip * (0.99, 1.0)]) * (1, side)
-        solid += prism(crown, 0.85 * height, height)
+        solid += prism(np.concatenate([outer, lip]) * (1, side), c.roof, 0.9 * height)
+        solid += prism(np.concatenate([outer * (0.99, 0.86), lip * (0.99, 1.0)]) * (1, side), 0.85 * height, height)
     tail = 0.004
     if c.capped:
         solid += box((back - tail, back), half, (c.roof, 0.9 * height))

@@ -110,10 +110,8 @@ def _dial(draws: Draws, phone: Assembly, face: Face, v: float, radius: float) ->
 def _display(draws: Draws, phone: Assembly, face: Face, v: float, deep: float, half: float) -> None:
     """A display above the keys, hinged at its lower edge."""
     thick = draws.length("display_thickness", (0.006, 0.012))
-    corners = [face.at(u, w, h) for u in (-half, half) for w in (v, v + deep) for h in (0.001, thick)]
-    solid = hull(corners)
+    solid = hull([face.at(u, w, h) for u in (-half, half) for w in (v, v + deep) for h in (0.001, thick)])
     inner = [face.at(u, w, h) for u in (-0.85 * half, 0.85 * half) for w in (v + 0.15 * deep, v + 0.85 * deep)
              for h in (0.5 * thick, thick + 0.0006)]  # fmt: skip
-    angle = draws.angle("display_angle", (0.4, 1.2))
-    hinge = revolute("base", face.right, tuple(face.at(0.0, v, 0.001)), 0.0, angle)
+    hinge = revolute("base", face.right, tuple(face.at(0.0, v, 0.001)), 0.0, draws.angle("display_angle", (0.4, 1.2)))
     phone.add("display", solid + hull(inner).called("display", face.outward), hinge, density=900.0)

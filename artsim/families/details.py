@@ -245,8 +245,7 @@ def push_button(face: Vector, size: Vector, round_off: float) -> Solid:
 
 def add_push_button(machine: Assembly, number: int, face: Vector, size: Vector, round_off: float) -> None:
     """Add a :func:`push_button` to a body that faces -X."""
-    slide = prismatic("body", (1, 0, 0), 0.0, 0.0015, face)
-    machine.add(f"button_{number}", push_button(face, size, round_off), slide)
+    machine.add(f"button_{number}", push_button(face, size, round_off), prismatic("body", (1, 0, 0), 0.0, 0.0015, face))
 
 
 @deferred

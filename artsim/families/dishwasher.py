@@ -204,8 +204,7 @@ def _controls(draws: Draws, machine: Assembly, s: Shape) -> None:
 
 def _door(draws: Draws, s: Shape, controls_above: bool, machine: Assembly) -> Solid:
     half, tall, x = s.half_door, s.top - s.bottom, -s.thick
-    kinds = {"bar": 0.24, "bow": 0.24, "flat": 0.16, "pocket": 0.18, "edge": 0.1, "none": 0.08}
-    kind = draws.pick("handle", kinds)
+    kind = draws.pick("handle", {"bar": 0.24, "bow": 0.24, "flat": 0.16, "pocket": 0.18, "edge": 0.1, "none": 0.08})
     machine.record(handles=kind not in ("pocket", "none"))
     banded = not controls_above and draws.chance("door_strip", 0.5)
     band = draws.length("door_strip_height", (0.08, 0.14)) if banded else 0.0

@@ -164,12 +164,11 @@ def _drink_jar(draws: Draws) -> Assembly:
     shape = draws.pick("outline", ["round", "round", "round", "square", "octagon", "hexagon"])
     outline = cross_section(shape, draws.number("sharpness", (0.0, 1.0)))
     mouth = draws.number("mouth", (0.55, 0.95))
-    kind = draws.pick("jar_shape", ["drum", "urn", "keg"])
     shares = {
         "drum": [(0.0, 0.95), (0.03, 1.0), (0.9, 1.0), (1.0, mouth)],
         "urn": [(0.0, 0.6), (0.15, 0.8), (0.5, 1.0), (0.8, 0.97), (1.0, mouth)],
         "keg": [(0.0, 0.8), (0.2, 0.94), (0.5, 1.0), (0.8, 0.94), (1.0, 0.78)],
-    }[kind]
+    }[draws.pick("jar_shape", ["drum", "urn", "keg"])]
     levels: list[Level] = [(foot + z * height, s * half, s * half, 1.0 if z == 1.0 else 0.0) for z, s in shares]
     body = moulded(levels, outline)
     body += _stand(draws, shares[0][1] * half, foot)
@@ -200,8 +199,7 @@ def _jar_lid(draws: Draws, radius: float, top: float) -> tuple[Solid, JointSpec]
     """A lid with a knob, which swings up, screws, or lifts off."""
     low = top + CLEAR
     lid = rod(0, 0, (low, low + 0.012), radius * draws.number("lid_radius", (0.95, 1.05)), 0.93 * radius)
-    rise = radius * draws.number("lid_rise", (0.05, 0.45))
-    lid += dome(0.9 * radius, low + 0.0115, rise)
+    lid += dome(0.9 * radius, low + 0.0115, radius * draws.number("lid_rise", (0.05, 0.45)))
     crown = float(lid.bounds()[1, 2])
     size = radius * draws.number("knob_size", (0.12, 0.2))
     knob = rod(0, 0, (crown - 0.004, crown + 0.6 * size), 0.5 * size) + ellipsoid((0, 0, crown + size), size, 12)
@@ -272,8 +270,7 @@ def _water_cooler(draws: Draws) -> Assembly:
     else:
         body += box(depth, half, (0.0, shelf), fillet=0.02, axis=2)
     body += box((-depth - 0.02, niche + 0.01), 0.6 * half, (shelf - 0.015, shelf + 0.008), fillet=0.006)
-    count = draws.pick("taps", {2: 0.75, 3: 0.25})
-    spots = (np.linspace(-1.0, 1.0, count) * 0.4 * half).tolist()
+    spots = (np.linspace(-1.0, 1.0, draws.pick("taps", {2: 0.75, 3: 0.25})) * 0.4 * half).tolist()
     style = draws.pick("tap", ["lever", "button", "tap"])
     z, nose = roof - (0.075 if style == "tap" else 0.02), niche - 0.045
     for y in spots:

@@ -115,8 +115,7 @@ def _on_stand(draws: Draws, display: Assembly) -> None:
 
     chain = _Chain(display)
     wide = 0.5 * draws.length("foot_width", (0.35, 0.85), of=2.0 * panel.half)
-    deep = max(draws.length("foot_depth", (0.5, 1.0), of=panel.half), 0.13)
-    chain.solid = _foot(draws, wide, deep, thick)
+    chain.solid = _foot(draws, wide, max(draws.length("foot_depth", (0.5, 1.0), of=panel.half), 0.13), thick)
     foot = thick
     if swivels:
         turn = draws.angle("neck_angle", (0.35, 1.57))
@@ -217,8 +216,7 @@ def _on_feet(draws: Draws, display: Assembly) -> None:
     panel = draw_panel(draws, 1.5)
     foot = draws.length("foot_height", (0.02, 0.1))
     middle = foot + GAP + panel.rise
-    chain = _Chain(display, "body")
-    _finish_screen(draws, chain, panel, np.array([0.0, 0.0, middle]), 0)
+    _finish_screen(draws, _Chain(display, "body"), panel, np.array([0.0, 0.0, middle]), 0)
     x = -0.5 * panel.thick
     spread = panel.half * draws.number("foot_place", (0.45, 0.85))
     reach = min(0.5 * draws.length("foot_depth", (0.2, 0.5), of=2.0 * panel.half), 0.8 * spread)
@@ -240,8 +238,7 @@ def _on_feet(draws: Draws, display: Assembly) -> None:
 def _on_easel(draws: Draws, display: Assembly) -> None:
     """A thin panel with a leaf or two legs on its back that fold out."""
     panel = draw_panel(draws, 0.6)
-    chain = _Chain(display, "body")
-    _finish_screen(draws, chain, panel, np.array([0.0, 0.0, panel.rise]), 0)
+    _finish_screen(draws, _Chain(display, "body"), panel, np.array([0.0, 0.0, panel.rise]), 0)
     z = 2.0 * panel.rise * draws.number("prop_height", (0.3, 0.85))
     low, thick = 0.04 * panel.rise, draws.length("prop_thickness", (0.002, 0.008))
     count = draws.integer("props", 1, 2)

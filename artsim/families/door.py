@@ -68,8 +68,7 @@ def build(draws: Draws) -> Assembly:
         low = np.array([-depth / 2, min(edge, inner), 0.008])
         high = np.array([-depth / 2 + style.thickness, max(edge, inner), height - 0.005])
         name = "door" if kind == "single" else f"door_{number}"
-        turning = style.handle in ("lever", "knob") and (number == 0 or both)
-        _leaf(draws, door, name, side, low, high, style, turning)
+        _leaf(draws, door, name, side, low, high, style, style.handle in ("lever", "knob") and (number == 0 or both))
         if ajar > 0 and number == 0:
             door.open_at_rest(name, ajar)
     return door
@@ -130,8 +129,7 @@ def _frame(draws: Draws, width: float, height: float, depth: float, jamb: float,
     elif extra == "wall":  # or fixed panels, beside and above
         # Up to a shop front or a long partition.
         beside = draws.number("wall_width", (0.2, 2.0), (0.2, 12.0), tails=0.3)
-        shares = draws.numbers("wall_side", 0.0 if beside < 4.0 else 0.7, 1.0, 2)
-        left, right = shares * min(beside * width, 3.7) + 0.02
+        left, right = draws.numbers("wall_side", 0.0 if beside < 4.0 else 0.7, 1.0, 2) * min(beside * width, 3.7) + 0.02
         above = draws.length("wall_above", (0.02, 0.6 if beside < 4.0 else 0.2))
         solid += frame((x0 + 0.004, -y - jamb - left, 0.0), (x1 - 0.003, y + jamb + right, height + jamb + above),
                        [left + 0.002, right + 0.002, 0.0, above + 0.002], 1, 2)  # fmt: skip

@@ -246,8 +246,7 @@ def _desk(draws: Draws, furniture: _Furniture) -> None:
         furniture.body += box((x - 0.06, x - 0.04), (left, right), (top - drop, top + 0.001))
     if draws.chance("flat_case", 0.5):
         flat = draws.length("flat_case_height", (0.08, 0.13))
-        columns = draws.pick("columns", {1: 0.7, 2: 0.3})
-        edges = np.linspace(left + wall, right - wall, columns + 1)
+        edges = np.linspace(left + wall, right - wall, draws.pick("columns", {1: 0.7, 2: 0.3}) + 1)
         far = x - max(0.058, draws.number("flat_case_setback", (0.05, 0.3)) * depth)
         levels = np.array([top - flat + wall, top - wall])
         furniture.add_case((-x, left, top - flat), (far, right, top + 0.001), wall, [edges, levels])

@@ -34,8 +34,7 @@ class Front:
     """Measures of the front, metres. The hinges lie at x = 0, the lenses before them."""
 
     def __init__(self, draws: Draws, shield: bool, outline: Array, rim: float, scale: float, flat: bool) -> None:
-        tall = (5.0, 13.0 if shield else 10.0) if flat else (2.2, 4.0)
-        height = draws.number("temple_height", tall, unit="mm")
+        height = draws.number("temple_height", (5.0, 13.0 if shield else 10.0) if flat else (2.2, 4.0), unit="mm")
         # The front lies at x = -ahead in the middle, and further back by wrap at the hinges.
         self.wrap = scale * draws.number("wrap", (1.0, 20.0) if shield else (0.5, 9.0), unit="mm") * MM
         low, high = outline[:, 1].min(), outline[:, 1].max()
@@ -91,8 +90,7 @@ def build(draws: Draws) -> Assembly:
         bend = others.number("hanging_bend", (0.02, 0.62)) * 2 * front.half
     temple = _temple(draws, front, max(bend, 0.0), flat)
     rise = float(np.ptp(temple.bounds()[:, 2])) + 2.0 * MM
-    upper = draws.one_of("upper_temple", {"left": -1, "right": 1})
-    tilt = upper * arcsin(min(rise / (2 * front.half), 1.0))
+    tilt = draws.one_of("upper_temple", {"left": -1, "right": 1}) * arcsin(min(rise / (2 * front.half), 1.0))
     limit = draws.turn("temple_angle", (77.0, 87.0))
     if aside:  # no temple passes the middle
         tilt, reach = 0.0, float(temple.bounds()[1, 0])
@@ -277,8 +275,7 @@ def _hinge(front: Front) -> tuple[Solid, Solid]:
 def _temple(draws: Draws, front: Front, bend: float, flat: bool) -> Solid:
     """Temple of the hinge at +y, along +x from the hinge at the origin, its end bent down."""
     shares = {"usual": (0.92, 1.06), "long": (1.06, 1.24), "short": (0.42, 0.92)}
-    reach = draws.one_of("temple_reach", shares, (0.55, 0.2, 0.25))
-    length = 2 * front.half * draws.number("temple_length", reach)
+    length = 2 * front.half * draws.number("temple_length", draws.one_of("temple_reach", shares, (0.55, 0.2, 0.25)))
     x = np.concatenate([np.linspace(GAP, 0.6 * length, 4), np.linspace(0.68, 1.0, 8) * length])
     share = np.clip(x / length - draws.number("bend_start", (0.66, 0.74)), 0, 1)
     z = -bend * power(share / share[-1], draws.number("bend_sharpness", (1.2, 1.8)))

@@ -113,8 +113,7 @@ def _cage(draws: Draws, cage: float, half: float, motor: float) -> Solid:
     solid = tube(circle((0, 0, 0), FRONT, cage, 24), 2.2 * wire, 8, closed=True)
     solid += rod((-half - 1.5 * wire, -half + wire), 0, 0, 0.85 * badge, badge)
     for name, x, hub in (("front", -half, 0.85 * badge), ("back", half, 0.8 * motor)):
-        flat = draws.number(f"cage_{name}", (0.82, 0.9))
-        path = np.array([(hub, x), (flat * cage, x), (cage, 0.0)])
+        path = np.array([(hub, x), (draws.number(f"cage_{name}", (0.82, 0.9)) * cage, x), (cage, 0.0)])
         for spot in wires:
             solid += tube(path[:, :1] * spot + path[:, 1:] * np.array([1.0, 0.0, 0.0]), wire, 5)
     return solid + tube(circle((-half, 0, 0), FRONT, 0.55 * cage, 16), 1.1 * wire, 5, closed=True)
@@ -201,8 +200,7 @@ def _ceiling_fan(draws: Draws) -> Assembly:
     root = body + draws.length("blade_arm", (0.03, 0.08))
     corner = draws.length("blade_corner", (0.2, 1.0), of=half)
     paddle = box((-reach, -root), half, 0.004, fillet=corner, axis=2, steps=4)
-    arm = box((-root - 0.06, -0.8 * body), 0.02, 0.0055)
-    blade = (paddle + arm).turned(FRONT, pitch).moved((0, 0, z))
+    blade = (paddle + box((-root - 0.06, -0.8 * body), 0.02, 0.0055)).turned(FRONT, pitch).moved((0, 0, z))
     rotor += union(blade.turned(UP, angle) for angle in turns(count))
     fan = Assembly("base", mount, 1500.0)
     fan.add("blades", rotor, continuous("base", UP, (0, 0, -drop)), density=900.0)

@@ -93,8 +93,7 @@ def _kitchen_mixer(draws: Draws) -> Assembly:
     handle = _handle(draws, draws.length("handle_radius", (0.9, 1.0), of=hub), length, False)
     travel = draws.angle("handle_travel", (0.8, 1.57))
     axis = -out * side if upright else out * side  # towards the user, or up
-    joint = revolute("base", axis, pivot, 0.0, travel)
-    tap.add("handle", _placed(handle, pivot, out, UP if upright else FRONT), joint)
+    tap.add("handle", _placed(handle, pivot, out, UP if upright else FRONT), revolute("base", axis, pivot, 0.0, travel))
     return tap
 
 

@@ -225,8 +225,7 @@ def _tip_up(draws: Draws) -> Assembly:
     x0, x1 = -0.5 * depth, 0.5 * depth
     on_post = draws.chance("on_posts", 0.5)
     for k in range(count + 1):
-        y = start + k * pitch
-        a, b = about(y, 0.5 * side_thick)
+        a, b = about(start + k * pitch, 0.5 * side_thick)
         if on_post:
             body += box((-0.02, 0.06), (a, b), (0.0, arm_z)) + box((x0 + 0.05, x1 + 0.06), (a, b), (0.0, 0.025))
             body += box((-0.02, x1 + 0.03 + back_thick), (a, b), (seat_z - 0.05, seat_z + thick + 0.1))
@@ -239,8 +238,7 @@ def _tip_up(draws: Draws) -> Assembly:
     for k in range(count):
         a, b = start + k * pitch + 0.5 * side_thick, start + (k + 1) * pitch - 0.5 * side_thick
         low, high = (x1 + 0.01, a - 0.002, lift), (x1 + 0.01 + back_thick, b + 0.002, lift + back_tall)
-        back = _panel(draws.within("back"), low, high, 2)
-        body += back.turned(SIDE, lean, (x1 + 0.01, 0, lift))
+        body += _panel(draws.within("back"), low, high, 2).turned(SIDE, lean, (x1 + 0.01, 0, lift))
         low, high = (x0, a + GAP + 0.008, seat_z), (hinge_x + 0.01, b - GAP - 0.008, seat_z + thick)
         seat = _panel(draws.within("seat"), low, high, 0)
         at = (hinge_x, 0.5 * (a + b), seat_z + 0.5 * thick)

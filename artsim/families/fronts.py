@@ -93,8 +93,7 @@ def drawer(draws: Draws, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]
 def door(draws: Draws, cell: Cell, style: Style, hinge: str) -> tuple[Solid, list[Moving]]:
     """One door, hinged at its "left", "right" (as one stands before it), "top" or "bottom"."""
     inside, trays = _interior(draws, cell, style)
-    leaf = _leaf(draws, cell, style, hinge, *_front_box(cell, style))
-    return inside, [leaf, *trays]
+    return inside, [_leaf(draws, cell, style, hinge, *_front_box(cell, style)), *trays]
 
 
 def double_door(draws: Draws, cell: Cell, style: Style) -> tuple[Solid, list[Moving]]:

@@ -112,8 +112,7 @@ def _stand(draws: Draws, radius: float, top: float, thick: float) -> Solid:
     if kind == "legs":
         for a in turns(draws.integer("leg_count", 3, 4)):
             out = np.array([cos(a + 0.3), sin(a + 0.3), 0.0])
-            heights = low + height * np.array([0.5, 0.25, 0.0])
-            path = np.outer([0.0, 0.5 * wide, wide], out) + np.outer(heights, UP)
+            path = np.outer([0.0, 0.5 * wide, wide], out) + np.outer(low + height * np.array([0.5, 0.25, 0.0]), UP)
             solid += tube(path, [stem, 0.8 * stem, 0.7 * stem], 10) + ellipsoid(path[-1], 0.9 * stem, 10)
         return solid
     tall = draws.length("foot_height", (0.06, 0.14), of=radius)

@@ -112,8 +112,7 @@ def cuckoo_clock(draws: Draws) -> Assembly:
     spans = [(seam, wide), (-wide, -seam)] if draws.chance("double_door", 0.5) else [(-wide, wide)]
     for number, across in enumerate(spans):
         leaf = box((front - 0.003, front), across, (base, max(top, base + 1.5 * wide)))
-        angle = draws.angle("door_angle", (1.2, 2.0))
-        joint = side_hinge(front - 0.003, across[1 - number], angle, number == 0)
+        joint = side_hinge(front - 0.003, across[1 - number], draws.angle("door_angle", (1.2, 2.0)), number == 0)
         clock.add(f"door_{number}" if len(spans) > 1 else "door", leaf, joint)
     clock.add("pendulum", *pendulum(draws, 0.4 * deep, low - 0.004, length, 0.9 * half), density=1500.0)
     if draws.chance("weight", 0.7):

@@ -208,8 +208,7 @@ def _lid_joint(draws: Draws, kind: str, pot: Pot, room: float) -> JointSpec:
         kind = "turn"
     if kind == "hinge":
         x, _, r = pot.hinge
-        upper = draws.turn("lid_angle", (60.0, 88.0))
-        return revolute("body", (0, 1, 0), (x, 0, pot.top + GAP + r), 0.0, upper)
+        return revolute("body", (0, 1, 0), (x, 0, pot.top + GAP + r), 0.0, draws.turn("lid_angle", (60.0, 88.0)))
     if kind == "turn":
         return continuous("body", UP, at)
     if kind == "screw":

@@ -210,8 +210,7 @@ def _wrist_rest(draws: Draws, keyboard: Assembly, low: Array, high: Array, end: 
     """A cushion that ends at x = ``end`` before the keyboard and pulls off to -X."""
     deep, rise = draws.length("depth", (0.04, 0.09)), height * draws.number("height", (0.6, 1.1))
     half = 0.5 * float(high[0] - low[0]) * draws.number("width", (0.85, 1.0))
-    across = about(-0.5 * float(low[0] + high[0]), half)
-    solid = box((end - deep, end), across, (0.0, rise), fillet=0.6 * rise, axis=1)
+    solid = box((end - deep, end), about(-0.5 * float(low[0] + high[0]), half), (0.0, rise), fillet=0.6 * rise, axis=1)
     slide = prismatic("body", (-1, 0, 0), 0.0, draws.length("travel", (0.02, 0.08)), (end, 0, 0))
     keyboard.add("wrist_rest", solid, slide, density=400.0)
 

@@ -85,8 +85,7 @@ def _handles(draws: Draws, radius: float, height: float, hinged: bool) -> Solid:
         if draws.chance("second_handle", 0.3):
             solid += _short(draws.within("second"), "bow", radius, z).turned(UP, np.pi)
         return solid.turned(UP, draws.one_of("handle_at", {"front": 0.0, "left": -0.5 * np.pi}))
-    kind = draws.pick("handle", {"bow": 0.45, "ear": 0.25, "bar": 0.3})
-    one = _short(draws, kind, radius, z).turned(UP, 0.5 * np.pi)
+    one = _short(draws, draws.pick("handle", {"bow": 0.45, "ear": 0.25, "bar": 0.3}), radius, z).turned(UP, 0.5 * np.pi)
     return one + one.mirrored(1)
 
 

@@ -24,8 +24,7 @@ GAP = 0.001
 
 def build(draws: Draws) -> Assembly:
     """A lamp; what leans, leans forward to -X at rest."""
-    makers = {"desk": _desk, "standing": standing, "spotlight": spotlight}
-    return draws.one_of("kind", makers, (0.5, 0.32, 0.18))(draws)
+    return draws.one_of("kind", {"desk": _desk, "standing": standing, "spotlight": spotlight}, (0.5, 0.32, 0.18))(draws)
 
 
 def _desk(draws: Draws) -> Assembly:
@@ -41,8 +40,7 @@ def _desk(draws: Draws) -> Assembly:
         k = [link.name for link in links].index("lower_arm")
         arm = links[k].joint
         assert arm is not None
-        joint = revolute(links[k - 1].name, SIDE, foot, arm.lower, arm.upper, mimic=("lower_arm", 1.0))
-        lamp.add("rod", beside, joint)
+        lamp.add("rod", beside, revolute(links[k - 1].name, SIDE, foot, arm.lower, arm.upper, mimic=("lower_arm", 1.0)))
     return lamp
 
 

@@ -106,8 +106,7 @@ def _base(draws: Draws, shape: _Shape) -> Solid:
         solid += posts(across, width / 2 - 3.5 * foot, (-0.15 * foot, 0.5 * height), foot, sections=16)
     if draws.chance("latch", 0.15):  # or a lip, at the front
         half, reach = draws.number("latch_width", (0.03, 0.2)) * width, draws.length("latch_reach", (0.002, 0.012))
-        latch = box((front - reach, front + 0.2 * shape.depth), half, (0.3 * deck, 0.8 * deck))
-        solid += latch.called("latch", FRONT)
+        solid += box((front - reach, front + 0.2 * shape.depth), half, (0.3 * deck, 0.8 * deck)).called("latch", FRONT)
     return solid
 
 
@@ -140,8 +139,7 @@ def _keyboard(draws: Draws, shape: _Shape, deck: float, rim: float) -> Solid:
     solid = Solid()
     for block, (right, left) in enumerate(blocks):
         for row in range(rows):
-            count = 4 if block else draws.integer("row_keys", 9, 13)
-            edges = np.linspace(right, left, count + 1)
+            edges = np.linspace(right, left, (4 if block else draws.integer("row_keys", 9, 13)) + 1)
             if row == rows - 1 and not block:  # the row with the space bar
                 edges = right + (left - right) * np.array([0.0, 0.13, 0.27, 0.7, 0.86, 1.0])
             x = keys_back - row * pitch

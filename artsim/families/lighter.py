@@ -35,8 +35,7 @@ def _spark_wheel(center: Array, radius: float, half: float, notched: bool) -> So
 def _outline(draws: Draws, half_x: float, half_y: float) -> Array:
     """(N, 2) cross-section: oval, rounded rectangle or with a round front."""
     round_, square = draws.number("round_section", (2.2, 4.0)), draws.number("square_section", (5.0, 12.0))
-    power = draws.one_of("section", {"oval": 2.0, "round": round_, "square": square})
-    return superellipse(power, half_x, half_y, 20)
+    return superellipse(draws.one_of("section", {"oval": 2.0, "round": round_, "square": square}), half_x, half_y, 20)
 
 
 def _layers(outline: Array, levels: list[tuple[float, float]]) -> Solid:

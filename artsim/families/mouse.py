@@ -86,8 +86,7 @@ def build(draws: Draws) -> Assembly:
     turn = None
     if draws.chance("upright", 0.14, upper=True):  # rolled onto its side
         way = draws.pick("upright_hand", {"right": 0.85, "left": 0.15})
-        roll = {"right": -1.0, "left": 1.0}[way] * draws.angle("roll", (0.25, 0.85))
-        turn = rotation_about((1.0, 0.0, 0.0), roll)
+        turn = rotation_about((1.0, 0.0, 0.0), {"right": -1.0, "left": 1.0}[way] * draws.angle("roll", (0.25, 0.85)))
     mouse = _Mouse(turn)
     _shell(draws, mouse, dome)
     if turn is not None:
@@ -176,8 +175,7 @@ def _shell(draws: Draws, mouse: _Mouse, dome: _Dome) -> None:
         top = float(max(dome.at(x)[0] for x in np.linspace(start, start + 0.16 * length, 7)))
         for k in range(draws.integer("keys", 1, 2)):
             face = top_face(top, start + (0.04 + 0.075 * k) * length, dome.at(start)[2])
-            outline = pill(wide, 0.055 * length)
-            add_key(mouse, "body", f"key_{k}", face, (0.0, 0.0), outline, TRAVEL + 0.0016, TRAVEL)
+            add_key(mouse, "body", f"key_{k}", face, (0.0, 0.0), pill(wide, 0.055 * length), TRAVEL + 0.0016, TRAVEL)
 
 
 def _wheel(

@@ -88,8 +88,7 @@ def _tip(draws: Draws, section: _Section, radius: float, length: float) -> Solid
         felt = section.rod([(0.5 * radius, 0.0), (0.55 * radius, 0.45 * length)])
         return felt + section.rod([(0.8 * radius, 0.4 * length), neck])
     point = 0.12 * radius if kind == "cone" else 0.3 * radius
-    bend = draws.number("point_bend", (0.45, 0.75))
-    return section.rod([(point, 0.0), (bend * radius, 0.5 * length), neck])
+    return section.rod([(point, 0.0), (draws.number("point_bend", (0.45, 0.75)) * radius, 0.5 * length), neck])
 
 
 def _clip(draws: Draws, section: _Section, radius: float, top: float, length: float) -> Solid:

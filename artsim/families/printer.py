@@ -167,8 +167,7 @@ def _pull(draws: Draws, front: float, half: float, low: float, high: float) -> S
         return box(deep, half, (high - 0.3 * tall, high - 0.15 * tall)).called("handle", FRONT)
     if kind == "bar":
         r = min(0.2 * tall, 0.01)
-        bar = box(deep, half, about(0.5 * (low + high), r), fillet=0.4 * r, axis=1, steps=2)
-        return bar.called("handle", FRONT)
+        return box(deep, half, about(0.5 * (low + high), r), fillet=0.4 * r, axis=1, steps=2).called("handle", FRONT)
     return Solid()
 
 
@@ -188,8 +187,7 @@ def _keys(draws: Draws, printer: Assembly, parent: str, front: float, half: floa
     number = 0
     for side in sides:
         middle = side * (0.9 * half - 0.5 * columns * pitch)
-        reach = 0.5 * columns * pitch
-        spots = key_cells(about(middle, reach), about(0.0, 0.45 * rise), max(columns, 1), rows)
+        spots = key_cells(about(middle, 0.5 * columns * pitch), about(0.0, 0.45 * rise), max(columns, 1), rows)
         number = add_buttons(printer, parent, face, spots, outline, travel + 0.002, travel, first=number)
 
 

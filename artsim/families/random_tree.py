@@ -73,8 +73,7 @@ class _Branch:
 
 def build(draws: Draws) -> Assembly:
     """A random articulated object."""
-    count = 1 + draws.integer("parts", 1, 11)
-    parents = _parents(draws, count, draws.integer("deepest", 1, 6))
+    parents = _parents(draws, 1 + draws.integer("parts", 1, 11), draws.integer("deepest", 1, 6))
     root = _grow(draws, 0, parents, draws.length("scale", (0.04, 0.12)))
     tree = Assembly()
     _put(tree, root, (f"part_{k}" for k in itertools.count()), None, np.eye(3), np.zeros(3))

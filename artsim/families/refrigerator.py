@@ -89,8 +89,7 @@ def build(draws: Draws) -> Assembly:
             keys = box((-style.thick - 0.014, -0.5 * style.thick), about(y, 0.05), (z + 0.08, z + 0.13), fillet=0.004)
             solid += keys.called("panel", FRONT)
         name = f"door_{doors}" if layout != "single" else "door"
-        edge = left if side > 0 else right
-        fridge.add(name, solid, side_hinge(0.0, edge, opening, side > 0), density=200.0)
+        fridge.add(name, solid, side_hinge(0.0, left if side > 0 else right, opening, side > 0), density=200.0)
     return fridge
 
 

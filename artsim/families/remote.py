@@ -139,8 +139,7 @@ def _keys(draws: Draws, remote: Assembly, body: _Body) -> float:
     top, count, tallest = body.key_high, 0, height
     for band, columns, rows, deep in bands:
         if band == "pad":
-            added = _pad(draws, remote, face, top - 0.5 * deep, 0.46 * deep, height, travel)
-            tallest = max(tallest, added)
+            tallest = max(tallest, _pad(draws, remote, face, top - 0.5 * deep, 0.46 * deep, height, travel))
         elif band == "slider":
             outline, start = pill(min(half, 1.6 * pitch), 0.8 * pitch), top - deep + 0.5 * pitch
             slide = prismatic("body", (0, 0, 1), 0.0, deep - pitch, tuple(face.at(0.0, start)))

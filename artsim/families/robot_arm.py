@@ -61,8 +61,7 @@ class _Chain:
         r = self.radius
         if plate:
             half = 0.7 * end_radius * self.lateral
-            discs = [cylinder(p - half, p + half, q) for p, q in ((self.at, r), (end, end_radius))]
-            self.link.solid += hull_of(*discs)
+            self.link.solid += hull_of(*[cylinder(p - half, p + half, q) for p, q in ((self.at, r), (end, end_radius))])
             self.link.guard(self.at - r * self.along, end + end_radius * self.along, r)
         elif self.square and length > 3 * r:
             a, b = 0.72 * r, 0.72 * end_radius
@@ -150,8 +149,7 @@ def _arm(chain: _Chain, reach: float, kinds: str) -> None:
     bends = kinds.count("P")
     angles = np.zeros(bends)  # of every bend at rest: upright, or as a crane stoops
     if not draws.chance("upright", 0.25):
-        stoop = [draws.degrees(name, ends) for name, ends in STOOP.items()]
-        angles[:3] = -np.deg2rad(stoop)[:bends]
+        angles[:3] = -np.deg2rad([draws.degrees(name, ends) for name, ends in STOOP.items()])[:bends]
     long_limbs = 2 if bends > 1 else 1
     bend = 0
     for k, kind in enumerate(kinds):
@@ -195,8 +193,7 @@ def _base(chain: _Chain, reach: float) -> None:
     else:
         link.solid += box(floor - (wide, wide, 0), floor + (wide, wide, thick), fillet=0.2 * wide, axis=2)
         link.guard(floor, floor + (0, 0, thick), 1.3 * wide)
-    foot = r * draws.number("column_foot", (1.0, 1.15))
-    link.rod(floor + (0, 0, 0.5 * thick), floor + (0, 0, height), foot, r)
+    link.rod(floor + (0, 0, 0.5 * thick), floor + (0, 0, height), r * draws.number("column_foot", (1.0, 1.15)), r)
     chain.at = floor + (0, 0, height - 0.1 * r)
 
 
@@ -228,8 +225,7 @@ def _scara(chain: _Chain, reach: float, kinds: str) -> None:
     draws = chain.draws.within("scara")
     r = chain.radius = 1.15 * chain.radius
     height = reach * draws.number("height", (0.35, 0.6))
-    wide = r * draws.number("base_width", (1.2, 1.6))
-    chain.link.rod((0, 0, 0), (0, 0, 0.3 * r), wide)
+    chain.link.rod((0, 0, 0), (0, 0, 0.3 * r), r * draws.number("base_width", (1.2, 1.6)))
     chain.link.rod((0, 0, 0.2 * r), (0, 0, height), r)
     chain.at = np.array([0.0, 0.0, height])
     chain.along, chain.lateral = np.array([-1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])

@@ -73,8 +73,7 @@ def build(draws: Draws) -> Assembly:
     front = face - 0.0045  # clear of a raised board
     opener = draws.pick("opener", {"lever": 0.45, "wheel": 0.3, "pull": 0.25})
     combination = draws.chance("combination", 0.6)
-    door = _door(draws, shape, combination, opener)
-    safe.add("door", placed(door), side_hinge(x, sign * y, upper, left))
+    safe.add("door", placed(_door(draws, shape, combination, opener)), side_hinge(x, sign * y, upper, left))
 
     low, high = shape.door
     size = min(high[1] - low[1], high[2] - low[2])
@@ -100,8 +99,7 @@ def build(draws: Draws) -> Assembly:
             joint = continuous("door", (-1, 0, 0), foot_at)
         else:
             solid = _lever(draws, front, grip_y, grip_z, radius)
-            turn = draws.turn("handle_angle", (45.0, 95.0))
-            joint = revolute("door", (sign, 0, 0), foot_at, 0.0, turn)
+            joint = revolute("door", (sign, 0, 0), foot_at, 0.0, draws.turn("handle_angle", (45.0, 95.0)))
         safe.add("wheel" if opener == "wheel" else "handle", placed(solid), joint, density=3000.0)
     return safe
 

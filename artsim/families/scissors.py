@@ -54,8 +54,7 @@ class Ring:
         u = np.column_stack([self.radii[0] * cos(angles), wide * sin(angles)])
         c, s = cos(self.turn), sin(self.turn)
         plan = self.center + matmul(u, [[c, s], [-s, c]])
-        rise = self.slope * np.maximum(plan[:, 0] - plan[np.argmin(norm(plan)), 0], 0.0)
-        return np.column_stack([plan, rise])
+        return np.column_stack([plan, self.slope * np.maximum(plan[:, 0] - plan[np.argmin(norm(plan)), 0], 0.0)])
 
 
 def build(draws: Draws) -> Assembly:

@@ -85,8 +85,7 @@ def _foot(draws: Draws, kind: str, wide: float, thick: float, height: float, rad
     bulge = power(sin(np.pi * (0.15 + 0.85 * shares)), draws.number("vase_bulge", (0.7, 2.5)))
     radii = waist + (belly - waist) * bulge
     radii[-1] = max(1.3 * radius, 0.3 * waist)
-    path = np.column_stack([np.zeros(8), np.zeros(8), shares * top])
-    return tube(path, radii.tolist(), 20), top
+    return tube(np.column_stack([np.zeros(8), np.zeros(8), shares * top]), radii.tolist(), 20), top
 
 
 def _shade(draws: Draws, kind: str, rim: float, tall: float, low: float) -> Solid:

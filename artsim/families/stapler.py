@@ -47,8 +47,7 @@ def build(draws: Draws) -> Assembly:
         arm_width = min(arm_width * draws.number("mini_width", (1.4, 2.1)), 0.5 * length)
     stapler = Assembly("base", _base(draws.within("base"), lay, arm_width), 2500.0)
     magazine, arm = _magazine(draws.within("magazine"), lay), _arm(draws.within("arm"), lay, arm_width)
-    widest = _opening(arm, lay)
-    wide = min(draws.turn("arm_angle", (80, 125), (80, 206), tails=0.45), widest)
+    wide = min(draws.turn("arm_angle", (80, 125), (80, 206), tails=0.45), _opening(arm, lay))
     axis, origin = (0, 1, 0), (0, 0, lay.hinge)
     if draws.chance("magazine", 0.55):
         lift = min(draws.turn("magazine_angle", (12, 50)), 0.5 * wide)

@@ -45,8 +45,7 @@ def build(draws: Draws) -> Assembly:
     cells, furniture.body = _divide(draws, whole, style, 0)
     cells.sort(key=lambda item: -item[0].sides[0] * item[0].sides[1])
     for cell, recipe in cells:  # the largest, and those like it, are not left open
-        must_move = recipe == cells[0][1]
-        inside, parts = _fill(draws.fork("", recipe), cell, style, drawers, must_move)
+        inside, parts = _fill(draws.fork("", recipe), cell, style, drawers, recipe == cells[0][1])
         if len(furniture) + len(parts) > 1 + MOST_MOVING:
             inside, parts = fronts.shelves(draws, cell, style)
         furniture.body += inside

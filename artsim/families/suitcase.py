@@ -161,8 +161,7 @@ def _briefcase(draws: Draws) -> Assembly:
         back += union(rod(0.6 * x, s * 0.8 * y, (-0.008, 0.003), 0.008, 0.01, 12) for s in (-1, 1))
     case = Assembly("body", back + lugs, 300.0)
     fixed = draws.chance("handle_fixed", 0.35)
-    limit = draws.turn("lid_angle", (45.0, 175.0))
-    case.add("lid", front, revolute("body", (0, -1, 0), (seam, 0, barrel), 0.0, limit))
+    case.add("lid", front, revolute("body", (0, -1, 0), (seam, 0, barrel), 0.0, draws.turn("lid_angle", (45.0, 175.0))))
     if fixed:
         case.body += handle.called("handle", UP)
     else:

@@ -39,8 +39,7 @@ def add_case(
     parts: list[Moving] = []
     for column in columns:
         draw = draws.fork("", recipe) if alike else draws
-        rows = grid[1] if alike else draws.integer("rows", 1, grid[1])
-        cells, boards = _divided(draw, column, 1, rows, style)
+        cells, boards = _divided(draw, column, 1, grid[1] if alike else draws.integer("rows", 1, grid[1]), style)
         solid += boards
         for cell in cells:
             inside, more = _fill(draw, cell, style, doors, must_move=not parts)
@@ -53,8 +52,7 @@ def add_case(
 
 def _divided(draws: Draws, cell: Cell, axis: int, count: int, style: Style) -> tuple[list[Cell], Solid]:
     """Cells side by side (axis 0) or one above the other (axis 1), and the boards between them."""
-    room = cell.sides[axis]
-    count = max(1, min(count, int(room / (0.16 if axis == 0 else 0.085))))
+    count = max(1, min(count, int(cell.sides[axis] / (0.16 if axis == 0 else 0.085))))
     shares = np.ones(count) if draws.chance("equal_cells", 0.5) else draws.numbers("cell_share", 0.7, 1.5, count)
     edges = levels(cell.low[axis], cell.high[axis], shares, 0.75)  # the least still holds a drawer
     half = style.board / 2

@@ -178,8 +178,7 @@ def _wheelie(draws: Draws) -> Assembly:
     lid = rounded_tray((-x - 0.02, -y - 0.012, seam), (x, y + 0.012, seam + rise), 0.005, radius, shape, side=-1)
     lid += box((x - 0.02, hinge[0]), 0.6 * y, (seam, seam + 0.009))
     lid += rod(hinge[0], (-0.6 * y, 0.6 * y), seam + 0.002, 0.008, sections=12)
-    angles = (75.0, 108.0) if draws.chance("lid_stops", 0.6) else (108.0, 205.0)
-    limit = draws.turn("lid_angle", angles)
+    limit = draws.turn("lid_angle", (75.0, 108.0) if draws.chance("lid_stops", 0.6) else (108.0, 205.0))
     over = np.linspace((-0.012, grip_z - 0.02 - seam), (grip_x - hinge[0], grip_z - seam), 8)
     limit = min(limit, _turned_over(shape, 0.012, rise, -0.011, over))
     can.add("lid", lid, revolute("body", SIDE, hinge, 0.0, limit))
@@ -187,6 +186,5 @@ def _wheelie(draws: Draws) -> Assembly:
         near, far = s * inner, s * (inner + wide)
         tyre = rod(axle[0], (near, far), wheel, wheel, sections=28)
         tyre += rod(axle[0], (far - s * 0.001, far + s * 0.008), wheel, 0.45 * wheel, 0.3 * wheel, 20)
-        turn = continuous("body", SIDE, (axle[0], 0.5 * (near + far), wheel))
-        can.add_numbered("wheel", tyre, turn, density=900.0)
+        can.add_numbered("wheel", tyre, continuous("body", SIDE, (axle[0], 0.5 * (near + far), wheel)), density=900.0)
     return can

@@ -37,8 +37,7 @@ _PLUGS = {"A": (0.0135, 0.006, 0.00225), "C": (0.0075, 0.0042, 0.00125), "micro"
 def build(draws: Draws) -> Assembly:
     """A USB stick that lies flat, its connector covered or drawn in at rest."""
     scale = draws.number("scale", (0.75, 1.9))  # novelty sticks are larger than their connectors ask for
-    measures = draws.one_of("plug", _PLUGS, (0.7, 0.2, 0.1))
-    sides = zip(("length", "width", "thickness"), measures, strict=True)
+    sides = zip(("length", "width", "thickness"), draws.one_of("plug", _PLUGS, (0.7, 0.2, 0.1)), strict=True)
     reach, *plug = (v * scale * draws.number(f"plug_{name}", (0.9, 1.15)) for name, v in sides)
     half = plug[0] * draws.number("width", (1.25, 2.6))
     thick = plug[1] * draws.triangular("height", 1.4, 1.9, 4.2)
@@ -120,8 +119,7 @@ def _body(draws: Draws, stick: _Stick, x0: float, x1: float, plain: bool = False
 def _capped(draws: Draws, usb: Assembly, stick: _Stick) -> None:
     """A cap that pulls off to -X; a wire loop at the back and a small slide switch on top, on some."""
     half, thick, length = stick.half, stick.thick, stick.length
-    body = _body(draws, stick, 0.0, length) + _plug(stick, 0.0)
-    usb.add("body", body + _eyelet(draws, stick, length))
+    usb.add("body", (_body(draws, stick, 0.0, length) + _plug(stick, 0.0)) + _eyelet(draws, stick, length))
     _cap(draws, usb, stick, "cap", 0.0, -1.0)
     if draws.chance("loop", 0.25, upper=True):
         wire = draws.length("loop_wire", (0.0006, 0.0012))
@@ -138,8 +136,7 @@ def _capped(draws: Draws, usb: Assembly, stick: _Stick) -> None:
 
 def _two_caps(draws: Draws, usb: Assembly, stick: _Stick) -> None:
     """A connector and a cap at either end."""
-    body = _body(draws, stick, 0.0, stick.length)
-    usb.add("body", body + _plug(stick, 0.0) + _plug(stick, stick.length, 1.0))
+    usb.add("body", _body(draws, stick, 0.0, stick.length) + _plug(stick, 0.0) + _plug(stick, stick.length, 1.0))
     _cap(draws, usb, stick, "cap_0", 0.0, -1.0)
     _cap(draws, usb, stick, "cap_1", stick.length, 1.0)
 

@@ -93,8 +93,7 @@ def _gate_valve(draws: Draws, pipe: float, room: float) -> tuple[Solid, Solid, f
             solid += tube([(0, side * reach, seat), (0, side * reach, hub - 0.35 * pipe), (0, side * (bore + 1.6 * leg),
                            hub - 0.15 * pipe - GAP)], leg, 10)  # fmt: skip
         solid += ring((0, 0, hub - GAP - 0.15 * pipe), UP, bore, bore + 2.5 * leg, 0.3 * pipe, 12)
-    radius = min(draws.length("wheel_radius", (1.5, 2.4), of=pipe), room)
-    wheel = _wheel(draws, hub, radius, stem, pipe)
+    wheel = _wheel(draws, hub, min(draws.length("wheel_radius", (1.5, 2.4), of=pipe), room), stem, pipe)
     wheel += rod(0, 0, (bottom + 0.2 * pipe, hub + 0.3 * pipe), stem, sections=16)
     return solid, wheel, hub, travel
 
@@ -115,8 +114,7 @@ def _wheel(draws: Draws, hub: float, radius: float, stem: float, pipe: float) ->
         if flat:
             across = np.cross(UP, out)
             cube = box(-0.4 * rim * np.ones(3), 0.4 * rim * np.ones(3))
-            ends = [cube.moved(p + s * 0.9 * rim * across) for p in (root, tip) for s in (-1, 1)]
-            solid += hull_of(*ends)
+            solid += hull_of(*[cube.moved(p + s * 0.9 * rim * across) for p in (root, tip) for s in (-1, 1)])
         else:
             solid += tube([root, tip], [0.9 * rim, 0.7 * rim], 8)
     return solid

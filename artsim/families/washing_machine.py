@@ -79,8 +79,7 @@ def _front_loader(draws: Draws, s: Shape) -> Assembly:
     outer = hole + draws.length("door_rim", (0.03, 0.055))
     thick = draws.length("door_thickness", (0.025, 0.05))
     door = _porthole(draws, z, hole, outer, thick, bowl)
-    upper = draws.turn("door_angle", (95.0, 160.0))
-    hinge = side_hinge(-GAP - thick, sign * (outer + 0.012), upper, left)
+    hinge = side_hinge(-GAP - thick, sign * (outer + 0.012), draws.turn("door_angle", (95.0, 160.0)), left)
     machine.add("door", door if left else door.mirrored(1), hinge)
     if turning:
         machine.add("drum", tub, continuous("body", FRONT, (0, 0, z)), density=900.0)
@@ -92,8 +91,7 @@ def _front_loader(draws: Draws, s: Shape) -> Assembly:
         inner = np.array([box_half - 0.004, room - 0.003])
         solid += tray((-proud - 0.006, *(slot - inner)), (0.55 * s.depth, *(slot + inner)), 0.003)
         grip = box((-proud - 0.024, -proud - 0.012), about(slot[0], 0.4 * box_half), (strip + 0.022, strip + 0.032))
-        travel = draws.number("drawer_travel", (0.3, 0.45)) * s.depth
-        slide = prismatic("body", FRONT, 0.0, travel, (0, *slot))
+        slide = prismatic("body", FRONT, 0.0, draws.number("drawer_travel", (0.3, 0.45)) * s.depth, (0, *slot))
         machine.add("detergent_drawer", solid + grip.called("handle", FRONT), slide)
         free = (across[1], s.half) if box_side < 0 else (-s.half, across[0])
     _controls(draws, machine, free, -proud, strip, s.high)

@@ -144,8 +144,7 @@ def _leaf(
     corner_low, corner_high = np.minimum(foot, tip) - 0.007, np.maximum(foot, tip) + 0.007
     corner_low[0], corner_high[0] = foot[0] - reach - 0.004, foot[0] - reach + 0.008
     lever += box(corner_low, corner_high, fillet=0.005, steps=2)
-    turn = float(end if along == 2 else -end)
-    joint = revolute(name, (turn, 0, 0), tuple(foot), 0.0, np.pi / 2)
+    joint = revolute(name, (float(end if along == 2 else -end), 0, 0), tuple(foot), 0.0, np.pi / 2)
     window.add(name.replace("sash", "handle"), lever, joint, label="handle", density=2500.0)
 
 
