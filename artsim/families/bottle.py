@@ -234,8 +234,7 @@ def _flip_top(draws: Draws, bottle: Assembly, mouth: Mouth) -> None:
     wall = 0.12 * radius
     lid = cap(0.98 * radius, wall, base, base + tall, top=0.98 * radius * draws.number("lid_taper", (0.75, 1.0)))
     z = base + r
-    lid += rod(x, (-half, half), z, r, sections=12)
-    lid += box((0.8 * radius, x), half, (base, base + 1.6 * r))
+    lid += rod(x, (-half, half), z, r, sections=12) + box((0.8 * radius, x), half, (base, base + 1.6 * r))
     roots = (0.7 * radius, x), (max(high - 2.5 * r, mouth.rim + GAP), high - r)
     collar += cheeks((x, z), r, half + 0.0006, half + 0.0006 + 1.5 * r, *roots, 10)
     if draws.chance("thumb_rest", 0.6):  # at the front

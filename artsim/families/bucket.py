@@ -12,7 +12,7 @@ from artsim.common.products import norm
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
 from artsim.making.outlines import SIDE, UP, Array, ends
-from artsim.making.solids import Solid, box, ring, rod, tube, vessel
+from artsim.making.solids import Solid, box, ring, rod, tube, union, vessel
 
 SIDES = 20
 """Segments of the vessel's circle."""
@@ -148,8 +148,7 @@ def _bail(draws: Draws, half: float, reach: float, pivot: float, pin: float, wir
     if draws.chance("strap", 0.25):  # wide along X
         wide = draws.number("strap_width", (1.5, 5.0))
         solid, radius = solid.scaled((wide, 1.0, 1.0)), wide * wire
-    for side_y in (-half, half):
-        solid += ring((0, side_y, pivot), SIDE, 1.1 * pin, 2.0 * pin + wire, 0.004, 10)
+    solid += union(ring((0, side_y, pivot), SIDE, 1.1 * pin, 2.0 * pin + wire, 0.004, 10) for side_y in (-half, half))
     if draws.chance("grip", 0.6):
         z = path[:, 2].max()
         grip, length = draws.length("grip_radius", (0.007, 0.013)), 0.35 * half

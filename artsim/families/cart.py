@@ -221,8 +221,7 @@ def _wheelbarrow(draws: Draws) -> Assembly:
     floor = [np.array([x, y, low]) for x, y in ((flare, -inner), (flare, inner), (back, inner), (back, -inner))]
     plan = ((front, -0.85 * half), (front, 0.85 * half), (length, half), (length, -half))
     rim = [np.array([x, y, low + deep]) for x, y in plan]
-    body = slab(floor, thick)
-    body += union(slab([floor[k - 1], floor[k], rim[k - 1], rim[k]], thick) for k in range(4))
+    body = slab(floor, thick) + union(slab([floor[k - 1], floor[k], rim[k - 1], rim[k]], thick) for k in range(4))
     body += tube(np.array(rim), 0.012, 8, closed=True)
     r = draws.length("shaft_radius", (0.014, 0.02))
     twin = draws.chance("twin_wheels", 0.25)

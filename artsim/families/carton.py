@@ -64,8 +64,7 @@ def _limit(draws: Draws, least: float) -> float:
 def _carton_body(draws: Draws, x: float, y: float, height: float, wall: float) -> Solid:
     if not (draws.chance("hand_holes", 0.35) and min(x, y) > 0.1 and height > 0.15):
         return tray((-x, -y, 0), (x, y, height), wall)
-    solid = box(x, y, (0, wall))
-    solid += box((-x, -x + wall), y, (0, height)) + box((x - wall, x), y, (0, height))
+    solid = box(x, y, (0, wall)) + box((-x, -x + wall), y, (0, height)) + box((x - wall, x), y, (0, height))
     low, high = height * draws.number("hole_bottom", (0.6, 0.68)), height * draws.number("hole_top", (0.75, 0.82))
     half = min(draws.length("hole_width", (0.035, 0.05)), 0.6 * x)
     for end in (-y, y - wall):

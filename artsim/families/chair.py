@@ -98,8 +98,7 @@ def _controls(draws: Draws, chair: Assembly, low: float) -> None:
     reach, z = draws.length("lever_length", (0.1, 0.2)), low + 0.002
     if draws.chance("lever", 0.45):
         start, tip = np.array([-0.06, side * (0.09 + GAP), z]), np.array([-0.06, side * (0.09 + reach), z - 0.01])
-        lever = cylinder(start, tip, 0.006, sections=12)
-        lever += cylinder(start + 0.6 * (tip - start), tip, 0.011, 0.009, 12)
+        lever = cylinder(start, tip, 0.006, sections=12) + cylinder(start + 0.6 * (tip - start), tip, 0.011, 0.009, 12)
         turn = revolute("seat", (-side, 0, 0), start, 0.0, draws.angle("lever_angle", (0.1, 0.3)))
         chair.add("lever", lever, turn, density=1200.0)
     if draws.chance("knob", 0.3):

@@ -199,8 +199,7 @@ def _twin_bell_clock(draws: Draws, body: Solid, radius: float, deep: float, half
         x, z = 0.5 * deep, half + 0.006
         tip = max(half * cos(spread) + 0.35 * size, z + 0.25 * size)
         head = min(0.35 * room, 0.1 * radius)
-        hammer = rod(x, 0, (z, tip), 0.5 * head, sections=8)
-        hammer += rod(x, (-0.8 * head, 0.8 * head), tip, head, sections=10)
+        hammer = rod(x, 0, (z, tip), 0.5 * head, sections=8) + rod(x, (-0.8 * head, 0.8 * head), tip, head, sections=10)
         limit = max(0.3 * (room - head) / (tip - z), 0.02)
         clock.add("hammer", hammer, revolute("body", FRONT, (x, 0, z), -limit, limit), density=3000.0)
     _knobs(draws, clock, deep, 0.5 * radius)

@@ -35,8 +35,7 @@ def _drip_tray(draws: Draws, machine: Assembly, x: float, front: float, y: float
 
 def _base(x: float, y: float, height: float, radius: float, tray_y: float, front: float) -> Solid:
     """Base plate with a niche for the drip tray in front, ``front`` deep."""
-    solid = box((-x + front, x), y, (0, height), fillet=radius, axis=2)
-    solid += box((-x, -x + front + radius), y, (0, 0.008))
+    solid = box((-x + front, x), y, (0, height), fillet=radius, axis=2) + box((-x, -x + front + radius), y, (0, 0.008))
     return solid + union(box((-x, -x + front + radius), (s * y, s * (tray_y + GAP)), (0.001, height)) for s in (-1, 1))
 
 
@@ -250,8 +249,7 @@ def _pod(draws: Draws) -> Assembly:
     tip = pivot - draws.number("lever_length", (0.6, 0.95)) * (pivot + x - 0.01)
     upright = (height + GAP, height + GAP + 0.010)
     lever = box((tip, tip + 0.03), wide, upright, fillet=0.004).called("handle", FRONT)
-    for s in (-1.0, 1.0):
-        lever += box((tip, pivot + 0.006), (s * wide, s * (wide - 0.01)), upright, fillet=0.004)
+    lever += union(box((tip, pivot + 0.006), (s * wide, s * (wide - 0.01)), upright, fillet=0.004) for s in (-1.0, 1.0))
     lever += rod(pivot, (-wide, wide), axle, 0.005, sections=12)
     limit = draws.turn("lever_angle", (60.0, 105.0))
     machine.add("lever", lever, revolute("body", (0, 1, 0), (pivot, 0, axle), 0.0, limit), density=900.0)

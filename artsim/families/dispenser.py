@@ -206,8 +206,7 @@ def _jar_lid(draws: Draws, radius: float, top: float) -> tuple[Solid, JointSpec]
     lid += knob.called("knob", UP)
     if draws.chance("lid_hinged", 0.3):
         x, w = 1.05 * radius + 0.006, 0.3 * radius
-        lid += rod(x, (-w, w), low + 0.004, 0.004, sections=12)
-        lid += box((0.8 * radius, x), w, (low, low + 0.004))
+        lid += rod(x, (-w, w), low + 0.004, 0.004, sections=12) + box((0.8 * radius, x), w, (low, low + 0.004))
         return lid, revolute("body", (0, 1, 0), (x, 0, low + 0.004), 0.0, draws.angle("lid_angle", (0.8, 1.55)))
     if draws.chance("lid_screws", 0.3):
         angle = 2.0 * np.pi * draws.number("lid_turns", (0.3, 2.0))
@@ -265,8 +264,7 @@ def _water_cooler(draws: Draws) -> Assembly:
     door = tall and draws.chance("door", 0.7)
     inset = 0.03 if door else 0.0
     if tall:
-        body += box((-depth + inset, depth), half, (0.0, shelf))
-        body += box(depth, half, (shelf - 0.03, shelf))
+        body += box((-depth + inset, depth), half, (0.0, shelf)) + box(depth, half, (shelf - 0.03, shelf))
     else:
         body += box(depth, half, (0.0, shelf), fillet=0.02, axis=2)
     body += box((-depth - 0.02, niche + 0.01), 0.6 * half, (shelf - 0.015, shelf + 0.008), fillet=0.006)

@@ -188,8 +188,7 @@ def _head(
         return solid + box((plane, axis + 0.001), about(y, ear), upright)
     for s in (-1.0, 1.0):
         first, last = sorted((y + s * (ear + 0.001), y + s * (ear + 0.006)))
-        solid += rod(axis, (first, last), z, knuckle, sections=14)
-        solid += box((plane, axis), (first, last), upright)
+        solid += rod(axis, (first, last), z, knuckle, sections=14) + box((plane, axis), (first, last), upright)
     return solid
 
 

@@ -56,10 +56,8 @@ class _Furniture(Assembly):
         inner_low, inner_high = low + wall / 2, high - wall / 2
         deep = (low[0], high[0] - thin)
         solid = tray(low, high, wall, wall / 2, axis=0, side=-1)
-        for z in edges_z[1:-1]:
-            solid += box(deep, (inner_low[1], inner_high[1]), (z - thin, z + thin))
-        for y in edges_y[1:-1]:
-            solid += box(deep, (y - thin, y + thin), (inner_low[2], inner_high[2]))
+        solid += union(box(deep, (inner_low[1], inner_high[1]), (z - thin, z + thin)) for z in edges_z[1:-1])
+        solid += union(box(deep, (y - thin, y + thin), (inner_low[2], inner_high[2])) for y in edges_y[1:-1])
         for row in range(len(edges_z) - 2, -1, -1):
             content = rows[row] if rows else "drawer"
             for column in range(len(edges_y) - 1):

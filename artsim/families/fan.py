@@ -84,12 +84,10 @@ def _steepest(cage: float, back: float, middle: float, column: float) -> float:
 def _neck(column: float, motor: float, z: float, level: float, side: float) -> Solid:
     """A knuckle with two cheeks that carry the motor."""
     cheek = 0.01
-    solid = rod(0, 0, (z, z + 0.014), 1.4 * column, sections=18)
-    solid += box(column, side + cheek, (z + 0.004, z + 0.014))
+    solid = rod(0, 0, (z, z + 0.014), 1.4 * column, sections=18) + box(column, side + cheek, (z + 0.004, z + 0.014))
     for s in (-1, 1):
         y0, y1 = sorted((s * side, s * (side + cheek)))
-        solid += box(0.9 * column, (y0, y1), (z + 0.005, level))
-        solid += rod(0, (y0, y1), level, 1.1 * column, sections=18)
+        solid += box(0.9 * column, (y0, y1), (z + 0.005, level)) + rod(0, (y0, y1), level, 1.1 * column, sections=18)
     return solid
 
 
@@ -98,8 +96,7 @@ def _head(draws: Draws, cage: float, motor: float, level: float, pins: float, ba
     half = 0.5 * draws.length("cage_depth", (0.17, 0.26), of=2 * cage)
     middle = back - half
     wide = 0.75 * motor
-    solid = rod((back, 0.6 * motor), 0, 0, wide)
-    solid += rod((0.59 * motor, 0.85 * motor), 0, 0, wide, 0.6 * wide)
+    solid = rod((back, 0.6 * motor), 0, 0, wide) + rod((0.59 * motor, 0.85 * motor), 0, 0, wide, 0.6 * wide)
     solid += rod(0, (-pins, pins), 0, 0.35 * motor, sections=16)
     solid += _cage(draws, cage, half, wide).moved((middle, 0, 0))
     return solid.moved((0, 0, level)), middle
@@ -114,8 +111,7 @@ def _cage(draws: Draws, cage: float, half: float, motor: float) -> Solid:
     solid += rod((-half - 1.5 * wire, -half + wire), 0, 0, 0.85 * badge, badge)
     for name, x, hub in (("front", -half, 0.85 * badge), ("back", half, 0.8 * motor)):
         path = np.array([(hub, x), (draws.number(f"cage_{name}", (0.82, 0.9)) * cage, x), (cage, 0.0)])
-        for spot in wires:
-            solid += tube(path[:, :1] * spot + path[:, 1:] * np.array([1.0, 0.0, 0.0]), wire, 5)
+        solid += union(tube(path[:, :1] * spot + path[:, 1:] * np.array([1.0, 0.0, 0.0]), wire, 5) for spot in wires)
     return solid + tube(circle((-half, 0, 0), FRONT, 0.55 * cage, 16), 1.1 * wire, 5, closed=True)
 
 
@@ -166,8 +162,7 @@ def _box_fan(draws: Draws) -> Assembly:
             base += box((x - 0.8 * bar, x + 0.8 * bar), outer - 0.5 * wall, (z - bar, z + bar))
     motor = 0.25 * cage
     back = half - 0.35 * half
-    base += rod((back, half - bar), 0, 0, motor)
-    base += rod((-half + bar, -half - 0.002), 0, 0, 0.16 * cage)
+    base += rod((back, half - bar), 0, 0, motor) + rod((-half + bar, -half - 0.002), 0, 0, 0.16 * cage)
     corner = np.array([-half, outer - 0.035, outer - 0.035])
     with_knob = draws.chance("knob", 0.5)
     if with_knob:

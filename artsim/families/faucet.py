@@ -106,8 +106,7 @@ def _three_piece(draws: Draws) -> Assembly:
     base = box(half, spread + half, (0, plate), fillet=half, axis=2, steps=5)
     hub = draws.length("foot_top_radius", (0.45, 0.9), of=radius)
     for y in (-spread, spread):
-        base += rod(0, y, (0.5 * plate, height), radius, hub)
-        base += rod(0, y, (0.5 * plate, plate + 0.004), 1.1 * radius)
+        base += rod(0, y, (0.5 * plate, height), radius, hub) + rod(0, y, (0.5 * plate, plate + 0.004), 1.1 * radius)
     r = draws.length("spout_radius", (0.4, 0.6), of=radius)
     column = draws.length("column_height", (0.6, 1.3), of=height) + 0.01
     base += rod(0, 0, (0.5 * plate, column), radius, max(hub, 1.2 * r))

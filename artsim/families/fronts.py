@@ -15,7 +15,7 @@ from artsim.families.details import front_handle, knob, panel, swing_limits
 from artsim.making.assembly import JointSpec, prismatic, revolute
 from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, Array, about
-from artsim.making.solids import Solid, box, cylinder, deferred, hull_of, tray
+from artsim.making.solids import Solid, box, cylinder, deferred, hull_of, tray, union
 
 GAP = 0.0015
 T = TypeVar("T")
@@ -128,8 +128,7 @@ def sliding_doors(draws: Draws, cell: Cell, style: Style) -> tuple[Solid, list[M
             solid += _handle(style, grip, 2, min(0.5 * style.handle_length, 0.3 * (high[2] - low[2])), low, high)
         else:
             radius = min(0.4 * style.rail, 0.02)
-            for depth in (-0.001, 0.003):
-                solid += cylinder(grip, np.add(grip, (depth, 0, 0)), radius)
+            solid += union(cylinder(grip, np.add(grip, (depth, 0, 0)), radius) for depth in (-0.001, 0.003))
         leaves.append(("sliding_door", solid, prismatic("body", (0, -side, 0), 0.0, travel, tuple(0.5 * (low + high)))))
     return _shelves(draws, cell, style.face + (2 * (thickness + clear) + clear) + 0.015, style), leaves
 

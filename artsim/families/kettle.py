@@ -194,8 +194,7 @@ def _lid(draws: Draws, pot: Pot, hinged: bool) -> tuple[Solid, float]:
     lid += knob.called("knob", UP)
     if hinged:
         x, half, r = pot.hinge
-        lid += rod(x, (-half, half), z + r, r, sections=14)
-        lid += box((0.8 * radius, x), half, (z, z + r))
+        lid += rod(x, (-half, half), z + r, r, sections=14) + box((0.8 * radius, x), half, (z, z + r))
     elif draws.chance("lid_bead", 0.5):  # a rim that reaches into the pot is hidden: only a plate shows
         lid += ring((0, 0, z + 0.5 * rim), UP, 0.9 * radius, 1.03 * radius, 0.6 * rim, 24)
     return lid, top

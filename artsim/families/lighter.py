@@ -87,8 +87,7 @@ def _pocket(draws: Draws) -> Assembly:
     lid += loft([lifted(plan, high - wall - 0.0002), lifted(plan * (0.85 if dome else 0.97), high + dome)])
     for side in (-1, 1):
         y = ends((side * 0.53 * half_y, side * 0.85 * half_y))
-        lid += rod(hinge_x, y, height, knuckle, sections=10)
-        lid += box((half_x - 0.0005, hinge_x), y, (low, low + 0.004))
+        lid += rod(hinge_x, y, height, knuckle, sections=10) + box((half_x - 0.0005, hinge_x), y, (low, low + 0.004))
     limit = draws.angle("lid_angle", (1.6, 2.6))
     lighter.add("lid", lid, revolute("body", (0, 1, 0), (hinge_x, 0, height), 0.0, limit), density=7000.0)
     if draws.chance("wheel", 0.85):

@@ -37,8 +37,7 @@ def build(draws: Draws) -> Assembly:
         side = 1.0 if k == 0 else -1.0
         low = 0.0 if k == 0 else 0.5 * (thick + GAP)
         high = low + 0.5 * (thick - GAP)
-        solid = union(prism(piece * (1, side), 0.0, thick) for piece in jaws)
-        solid += rod(0, 0, (low, high), disc)
+        solid = union(prism(piece * (1, side), 0.0, thick) for piece in jaws) + rod(0, 0, (low, high), disc)
         start = jaws[0][0, 0]
         anchor = np.array([(x, side * y) for x in (start, start - 0.0015) for y in (0.4 * near, 0.95 * near)])
         solid += hull_of(rod(0, 0, (low, high), 0.75 * disc), prism(anchor, low, high))

@@ -209,8 +209,7 @@ def _rail(chain: _Chain, reach: float) -> None:
         return box(along, across, z, fillet=fillet) if axis == "x" else box(across, along, z, fillet=fillet)
 
     chain.link.solid += beam(1.1 * r, (0, r), 0.15 * r)
-    for side in (-0.7, 0.7):
-        chain.link.solid += beam(((side - 0.15) * r, (side + 0.15) * r), (0.9 * r, 1.15 * r))
+    chain.link.solid += union(beam(((side - 0.15) * r, (side + 0.15) * r), (0.9 * r, 1.15 * r)) for side in (-0.7, 0.7))
     start, end = (share * direction + (0, 0, 0.5 * r) for share in along)
     chain.link.guard(start, end, 1.25 * r)
     chain.begin(prismatic, direction, 0.0, travel, (0, 0, 1.15 * r))

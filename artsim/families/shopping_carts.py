@@ -57,8 +57,7 @@ def shopping_cart(draws: Draws) -> Assembly:
                 (0.5 * length - 0.3 * lean - 0.02, s * 0.8 * half, low - 0.01)]  # fmt: skip
         body += tube(path, tubes, 8)
         body += bar((front + 0.05, foot, base), (front + 0.1 + lean, s * 0.6 * half * narrow, low + 0.05), 0.8 * tubes)
-    for x, y in ((back, track), (front, track * narrow)):
-        body += bar((x, -y, base), (x, y, base), tubes)
+    body += union(bar((x, -y, base), (x, y, base), tubes) for x, y in ((back, track), (front, track * narrow)))
     if draws.chance("rack", 0.5):
         rack = 0.7 * narrow * track
         body += union(bar((front, y, base), (back, y, base), 0.005, 4) for y in np.linspace(-rack, rack, 5).tolist())

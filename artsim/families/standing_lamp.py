@@ -47,8 +47,7 @@ def standing(draws: Draws) -> Assembly:
     shade = _shade(draws, kind, rim, tall, low)
     if tilts:  # a knuckle at the head of the pole carries it
         at = (0.0, 0.0, height + 0.015)
-        shade += rod(0, (-0.006, 0.006), at[2], 0.01, sections=14)
-        shade += box(0.004, 0.004, (at[2], low + 0.004))
+        shade += rod(0, (-0.006, 0.006), at[2], 0.01, sections=14) + box(0.004, 0.004, (at[2], low + 0.004))
         reach = draws.angle("shade_tilt", (0.4, 1.0))
         joint = revolute(parent, SIDE, at, -reach, reach)
     else:

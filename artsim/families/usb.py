@@ -240,8 +240,7 @@ def _retracting(draws: Draws, usb: Assembly, stick: _Stick) -> None:
         roof = np.column_stack([s * np.maximum(s * side[:, 0], slot), np.maximum(side[:, 1], inner[1])])
         solid += prism(np.concatenate([roof, [(s * slot, inner[1]), (s * slot, thick)]]), 0.0, back, 0)
     top = np.array([(y, z) for y in (-slot - 1e-4, slot + 1e-4) for z in (inner[1], thick)])
-    solid += prism(top, 0.0, max(first, 0.0005), 0) + prism(top, last, back, 0)
-    solid += prism(rim, back - 1e-4, length, 0)
+    solid += prism(top, 0.0, max(first, 0.0005), 0) + prism(top, last, back, 0) + prism(rim, back - 1e-4, length, 0)
     usb.add("body", solid + _eyelet(draws, replace(stick, half=half, thick=thick), length))
     slider = _plug(stick, stick.reach)
     low = inner - GAP

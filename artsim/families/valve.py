@@ -10,7 +10,7 @@ from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, continuous, revolute, screw
 from artsim.making.draws import Draws
 from artsim.making.outlines import UP, circle, turns
-from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, rod, tube
+from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, rod, tube, union
 
 GAP = 0.0015
 IRON = 4000.0  # kg/m^3, as real ones are hollow
@@ -125,8 +125,7 @@ def _ball_valve(draws: Draws, pipe: float, room: float) -> tuple[Solid, Solid, f
     belly = draws.length("body_radius", (1.25, 1.5), of=pipe)
     solid = ellipsoid((0, 0, 0), (belly, 1.2 * belly, belly), 18)
     sides = draws.pick("body_sides", [6, 8])
-    for side in (-1, 1):
-        solid += rod(0, (side * 0.5 * belly, side * 1.4 * belly), 0, 1.2 * pipe, sections=sides)
+    solid += union(rod(0, (side * 0.5 * belly, side * 1.4 * belly), 0, 1.2 * pipe, sections=sides) for side in (-1, 1))
     neck, top = 0.45 * pipe, belly + draws.length("neck_height", (0.25, 0.7), of=pipe)
     solid += rod(0, 0, (0, top), neck, sections=18)
     z = top + GAP

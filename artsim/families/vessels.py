@@ -136,8 +136,7 @@ def pump_head(draws: Draws, low: float, stem: float, size: float, reach: float, 
         back = ellipsoid((0, 0, middle), (size, size, 0.5 * tall), 14)
         return solid + hull_of(back, ellipsoid((-reach, 0, middle - 0.5 * droop * reach), 0.7 * r, 10))
     top = low + tall
-    solid += rod(0, 0, (low, top), size * draws.number("crown", (0.5, 0.9)), size)
-    solid += dome(size, top - 1e-4, 0.25 * tall)
+    solid += rod(0, 0, (low, top), size * draws.number("crown", (0.5, 0.9)), size) + dome(size, top - 1e-4, 0.25 * tall)
     return solid + tube([(0, 0, middle), (-reach, 0, middle - droop * reach)], [r, 0.8 * r], 10)
 
 

@@ -58,8 +58,7 @@ def wagon(draws: Draws) -> Assembly:
     pivot = np.array([nose - 0.014, 0.0, z])
     out = np.array([-cos(start), 0.0, sin(start)])
     tip = pivot + long * out
-    drawbar = cylinder(pivot - (0, 0.022, 0), pivot + (0, 0.022, 0), 0.011, sections=12)
-    drawbar += tube([pivot, tip], 0.009, 8)
+    drawbar = cylinder(pivot - (0, 0.022, 0), pivot + (0, 0.022, 0), 0.011, sections=12) + tube([pivot, tip], 0.009, 8)
     if draws.chance("bar_grip", 0.6):
         drawbar += cylinder(tip - (0, 0.07, 0), tip + (0, 0.07, 0), 0.013, sections=12)
     else:
