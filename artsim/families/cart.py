@@ -41,8 +41,7 @@ def _platform_trolley(draws: Draws) -> Assembly:
     spots = [(x_back, -spread), (x_back, spread), (x_front, -spread), (x_front, spread)]
     cart = Assembly("body", body, STEEL)
     cart.body += wheels.brackets(spots[swivels:], floor + 0.004)
-    r = draws.length("handle_radius", (0.01, 0.016))
-    rise = draws.length("handle_height", (0.7, 0.95))
+    r, rise = draws.lengths(handle_radius=(0.01, 0.016), handle_height=(0.7, 0.95))
     wide = half - 2.5 * r
     x = 0.5 * length - 2.0 * r - 0.01
     folds = draws.chance("handle_folds", 0.75)
@@ -213,8 +212,7 @@ def _wheelbarrow(draws: Draws) -> Assembly:
     wheels = Wheels(draws, (0.13, 0.2), (0.05, 0.09))
     half, length = 0.5 * draws.length("width", (0.48, 0.72)), draws.length("tray_length", (0.55, 0.85))
     low = wheels.radius + draws.length("tray_clearance", (0.02, 0.1))
-    deep = draws.length("tray_depth", (0.15, 0.32))
-    flare = draws.length("tray_flare", (0.05, 0.16))
+    deep, flare = draws.lengths(tray_depth=(0.15, 0.32), tray_flare=(0.05, 0.16))
     thick = 0.005
     inner, back = half - flare, length - 0.6 * flare
     front = -draws.length("tray_lean", (0.0, 0.15))

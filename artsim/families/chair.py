@@ -24,9 +24,8 @@ def build(draws: Draws) -> Assembly:
     span = 0.5 * draws.length("width", (0.44, 0.72))  # of legs or disc, which stand out below the seat
     castors = legs > 2 and draws.chance("caster", 0.75)
     lifted = draws.chance("piston", 0.7)
-    wheel = draws.length("wheel_radius", (0.022, 0.032))
+    wheel, column = draws.lengths(wheel_radius=(0.022, 0.032), column_radius=(0.022, 0.03))
     floor = 2.0 * wheel + 0.024 if castors else 0.0
-    column = draws.length("column_radius", (0.022, 0.03))
     piston = column - 0.004 - GAP
     stool = draws.chance("stool", 0.25)
     hub = floor + draws.length("hub_height", (0.05, 0.09))

@@ -102,8 +102,7 @@ def _longcase_clock(draws: Draws) -> Assembly:
     hood = 0.5 * draws.length("hood_width", (1.15, 1.45), of=2 * radius)
     trunk = 0.5 * draws.length("trunk_width", (0.65, 0.95), of=2 * hood)
     foot = 0.5 * draws.length("plinth_width", (1.05, 1.4), of=2 * trunk)
-    length = draws.length("trunk_height", (0.7, 1.1))
-    plinth = draws.length("plinth_height", (0.25, 0.45))
+    length, plinth = draws.lengths(trunk_height=(0.7, 1.1), plinth_height=(0.25, 0.45))
     low = -hood - draws.length("below_face", (0.0, 0.05))
     bottom = low - length
     body = dial_plate(draws, radius) + box((0.002, deep), hood, (low, hood))

@@ -38,8 +38,7 @@ def outline(kind: str, half: float, tall: float = 1.0) -> Array:
 def dial_plate(draws: Draws, radius: float) -> Solid:
     """A round plate whose front is the plane x = 0, with the marks of the hours: bars, dots, or four large ones."""
     kind = draws.pick("marks", ["bars", "dots", "four", "mixed"])
-    size = draws.length("mark_width", (0.02, 0.04), of=radius)
-    long = draws.length("mark_length", (0.05, 0.11), of=radius)
+    size, long = draws.lengths(mark_width=(0.02, 0.04), mark_length=(0.05, 0.11), of=radius)
     solid = rod((0, 0.004), 0, 0, radius, sections=32)
     for hour, a in enumerate(turns(12)):
         main = hour % 3 == 0
@@ -60,8 +59,7 @@ def add_hands(draws: Draws, clock: Assembly, radius: float, parent: str = "body"
     kind = draws.pick("hand_shape", list(HANDS))
     thick = max(0.012 * radius, 0.0008)
     gap = max(0.006 * radius, 0.0005)
-    wide = draws.length("hand_width", (0.035, 0.1), of=radius)
-    hub = draws.length("hand_hub", (0.05, 0.09), of=radius)
+    wide, hub = draws.lengths(hand_width=(0.035, 0.1), hand_hub=(0.05, 0.09), of=radius)
     names = ["hour_hand", "minute_hand"] + (["second_hand"] if draws.chance("second_hand", 0.5) else [])
     lengths = {"hour_hand": (0.45, 0.6), "minute_hand": (0.7, 0.9), "second_hand": (0.72, 0.92)}
     drawn = [draws.length(f"{name}_length", usual, of=radius) for name, usual in lengths.items()]

@@ -41,8 +41,7 @@ def _base(x: float, y: float, height: float, radius: float, tray_y: float, front
 
 def _espresso(draws: Draws) -> Assembly:
     x, y = 0.5 * draws.length("depth", (0.24, 0.36)), 0.5 * draws.length("width", (0.18, 0.38))
-    height = draws.length("height", (0.28, 0.4))
-    base, head = draws.length("base_height", (0.045, 0.075)), draws.length("head_height", (0.1, 0.15))
+    height, base, head = draws.lengths(height=(0.28, 0.4), base_height=(0.045, 0.075), head_height=(0.1, 0.15))
     front = draws.length("head_reach", (0.12, 0.15))  # how far head and base stand out before the column
     radius = draws.length("edge_radius", (0.005, 0.03))
     tray_y = y - 0.012
@@ -121,8 +120,7 @@ def _drip(draws: Draws) -> Assembly:
     y = 0.5 * draws.length("width", (0.15, 0.25))
     pot = y - draws.length("carafe_clearance", (0.01, 0.02))  # radius of the carafe
     x = pot + draws.length("tank_depth", (0.05, 0.07))
-    height = draws.length("height", (0.27, 0.42))
-    base, head = draws.length("base_height", (0.025, 0.04)), draws.length("head_height", (0.07, 0.1))
+    height, base, head = draws.lengths(height=(0.27, 0.42), base_height=(0.025, 0.04), head_height=(0.07, 0.1))
     radius = draws.length("edge_radius", (0.01, 0.5 * y))
     center = -x + pot + 0.012
     back = center + pot + 0.006
@@ -167,8 +165,7 @@ def _drip(draws: Draws) -> Assembly:
 
 def _percolator(draws: Draws) -> Assembly:
     """A tall jug with a handle, on a heated foot; its lid lifts off or swings up."""
-    foot, tall = draws.length("foot_height", (0.03, 0.11)), draws.length("jug_height", (0.14, 0.3))
-    radius = draws.length("jug_radius", (0.045, 0.085))
+    foot, tall, radius = draws.lengths(foot_height=(0.03, 0.11), jug_height=(0.14, 0.3), jug_radius=(0.045, 0.085))
     narrow, half = draws.number("jug_bottom", (0.6, 1.05)) * radius, draws.number("foot_width", (0.95, 1.35)) * radius
     waist = draws.number("collar_height", (0.0, 0.25)) * tall  # between the foot and the jug
     upper = draws.number("foot_taper", (0.75, 1.0)) * half
@@ -233,10 +230,8 @@ def _carafe(draws: Draws, center: float, pot: float, low: float, high: float) ->
 
 def _pod(draws: Draws) -> Assembly:
     y, x = 0.5 * draws.length("width", (0.11, 0.17)), 0.5 * draws.length("depth", (0.26, 0.36))
-    height = draws.length("height", (0.22, 0.3))
-    base, head = draws.length("base_height", (0.03, 0.045)), draws.length("head_height", (0.08, 0.11))
-    front = draws.length("head_reach", (0.1, 0.13))
-    radius = draws.length("edge_radius", (0.01, 0.03))
+    height, base, head = draws.lengths(height=(0.22, 0.3), base_height=(0.03, 0.045), head_height=(0.08, 0.11))
+    front, radius = draws.lengths(head_reach=(0.1, 0.13), edge_radius=(0.01, 0.03))
     tank_x = x - draws.length("tank_depth", (0.05, 0.07))
     body = _base(x, y, base, radius, y - 0.01, front)
     body += box((-x + front, tank_x), y, (base - 0.002, height - 0.002), fillet=radius, axis=2)

@@ -15,8 +15,7 @@ GAP = 0.0005
 
 def desk_set(draws: Draws, phone: Assembly) -> None:
     """A sloping base with keys or a dial, and a handset across its left side or along its back."""
-    depth, width = draws.length("depth", (0.14, 0.26)), draws.length("width", (0.13, 0.3))
-    front = draws.length("front_height", (0.012, 0.04))
+    depth, width, front = draws.lengths(depth=(0.14, 0.26), width=(0.13, 0.3), front_height=(0.012, 0.04))
     back = max(draws.length("height", (0.03, 0.13)), front)
     inset = draws.number("deck_inset", (0.0, 0.18)) * min(width, depth)
     reach = depth - inset  # of the deck

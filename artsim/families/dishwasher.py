@@ -54,7 +54,7 @@ def build(draws: Draws) -> Assembly:
     narrow = draws.chance("narrow", 0.2) and not compact
     width = draws.length("width", (0.42, 0.48) if narrow else (0.54, 0.64))
     height = draws.length("height", (0.75, 0.95), of=width) if compact else draws.length("height", (0.70, 0.9))
-    wall, thick = draws.length("wall", (0.012, 0.04)), draws.length("door_thickness", (0.03, 0.075))
+    wall, thick = draws.lengths(wall=(0.012, 0.04), door_thickness=(0.03, 0.075))
     low = compact or draws.chance("plinth_low", 0.4)
     plinth = draws.length("plinth_height", (0.02, 0.05) if low else (0.06, 0.15))
     strip = draws.length("strip_height", (0.07, 0.14)) if draws.chance("fixed_strip", 0.4) else 0.0
@@ -95,7 +95,7 @@ def _drawers(draws: Draws) -> Assembly:
     """Tubs that slide out behind a full front, one above the other."""
     count = draws.pick("drawers", {1: 0.65, 2: 0.35})
     half, depth = 0.5 * draws.length("width", (0.5, 0.64)), draws.length("depth", (0.42, 0.62))
-    wall, plinth = draws.length("wall", (0.012, 0.03)), draws.length("plinth_height", (0.015, 0.1))
+    wall, plinth = draws.lengths(wall=(0.012, 0.03), plinth_height=(0.015, 0.1))
     tall = draws.length("drawer_height", (0.4, 0.75) if count == 1 else (0.34, 0.42))
     height, thick = plinth + count * tall, draws.length("door_thickness", (0.02, 0.05))
     half_door = half + draws.length("front_overlap", (-0.002, 0.025))
@@ -227,10 +227,10 @@ def _door(draws: Draws, s: Shape, controls_above: bool, machine: Assembly) -> So
         edge = draws.length("door_board_margin", (0.02, 0.07))
         solid += box((x - 0.004, x + 0.003), half - edge, (s.bottom + edge, z - 0.03), fillet=0.003)
     span = half * draws.number("handle_length", (0.45, 0.93))
-    reach, radius = draws.length("handle_reach", (0.03, 0.06)), draws.length("handle_radius", (0.006, 0.013))
+    reach, radius = draws.lengths(handle_reach=(0.03, 0.06), handle_radius=(0.006, 0.013))
     left, right = (x, -span, z), (x, span, z)
     if kind == "flat":
-        width, depth = draws.length("handle_width", (0.015, 0.04)), draws.length("handle_depth", (0.006, 0.014))
+        width, depth = draws.lengths(handle_width=(0.015, 0.04), handle_depth=(0.006, 0.014))
         solid += flat_handle(left, right, reach, width, depth)
     elif kind == "edge":  # a lip along the upper edge
         solid += box((x - reach, x + 0.01), half, (s.top - 0.02, s.top), fillet=0.006).called("handle", FRONT)

@@ -104,7 +104,7 @@ def _bottle_levels(draws: Draws, depth: float, half: float, height: float, radiu
 def _soap_box(draws: Draws) -> Assembly:
     """A box with a cover in front, and a lever, a push bar or buttons below it."""
     depth, half = draws.length("depth", (0.07, 0.13)), 0.5 * draws.length("width", (0.1, 0.22))
-    height, radius = draws.length("height", (0.14, 0.32)), draws.length("edge_radius", (0.005, 0.03))
+    height, radius = draws.lengths(height=(0.14, 0.32), edge_radius=(0.005, 0.03))
     low = height * draws.number("cover_bottom", (0.22, 0.35))
     thick = depth * draws.number("cover_depth", (0.2, 0.7))
     front = -thick - CLEAR  # of the body behind the cover

@@ -101,7 +101,7 @@ def _on_stand(draws: Draws, display: Assembly) -> None:
     tilts = tilts or count > 1 or not (swivels or slides)
     pivots = pivots and count == 1 and not panel.bend
     below = float(hypot(panel.half, panel.rise)) if pivots else panel.rise  # how far the panel reaches from its middle
-    radius, knuckle = draws.length("column_radius", (0.012, 0.026)), draws.length("hinge_radius", (0.006, 0.012))
+    radius, knuckle = draws.lengths(column_radius=(0.012, 0.026), hinge_radius=(0.006, 0.012))
     front = -radius - (GAP + 0.006 if slides else 0.0)  # of what the hinge is fixed to
     axis = front - knuckle - 0.004
     plane = axis - knuckle - draws.length("hinge_reach", (0.008, 0.03))  # of the panel's back

@@ -217,10 +217,10 @@ def _turning_handle(
     z, out = style.handle_z, 0.045
     handle = rod((front - out, back + out), y, z, 0.0085, sections=12)
     if style.handle == "knob":
-        width, tall = draws.length("knob_width", (0.024, 0.032)), draws.length("knob_height", (0.02, 0.032))
+        width, tall = draws.lengths(knob_width=(0.024, 0.032), knob_height=(0.02, 0.032))
         handle += union(ellipsoid((x, y, z), (0.02, width, tall)) for x in (front - out - 0.01, back + out + 0.01))
         return handle, -1.3, 1.3
-    length, droop = draws.length("lever_length", (0.09, 0.13)), draws.length("lever_rise", (-0.012, 0.012))
+    length, droop = draws.lengths(lever_length=(0.09, 0.13), lever_rise=(-0.012, 0.012))
     radius = draws.length("lever_radius", (0.007, 0.01))
     for x, turn in ((front - out, 1.0), (back + out, -1.0)):
         path = [(x, y - 0.4 * side * radius, z), (x, y + 0.6 * side * length, z + droop),

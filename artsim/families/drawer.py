@@ -154,7 +154,7 @@ def _table(draws: Draws, furniture: _Furniture) -> None:
     depth = min(max(width * draws.number("depth", (0.35, 1.0)), 0.3), 1.0)
     if draws.chance("unusual", 0.25):
         depth, width, height = unusual_sides(draws, _LEAST_SHARES, _MOST_SHARES, (0.3, 0.34, 0.32))
-    thick, over = draws.length("top_thickness", (0.015, 0.05)), draws.length("top_overhang", (0.0, 0.07))
+    thick, over = draws.lengths(top_thickness=(0.015, 0.05), top_overhang=(0.0, 0.07))
     leg = height * draws.number("leg_width", (0.05, 0.13))
     over = min(over, width / 2 - leg - _NARROWEST / 2, depth / 2 - leg - _SHALLOWEST / 2)  # room between the legs
     x, y, top = depth / 2 - over, width / 2 - over, height - thick
@@ -198,8 +198,7 @@ def _desk(draws: Draws, furniture: _Furniture) -> None:
     """A top over one or two pedestals with drawers; legs or a panel elsewhere, perhaps flat drawers between."""
     height = draws.length("height", (0.62, 0.82))
     width, depth = height * draws.number("width", (1.4, 2.4)), height * draws.number("depth", (0.55, 1.0))
-    thick, over = draws.length("top_thickness", (0.018, 0.05)), draws.length("top_overhang", (0.0, 0.05))
-    wall = draws.length("board", (0.014, 0.022))
+    thick, over, wall = draws.lengths(top_thickness=(0.018, 0.05), top_overhang=(0.0, 0.05), board=(0.014, 0.022))
     x, y, top = depth / 2 - over, width / 2 - over, height - thick
     furniture.body += _top(draws, depth, width, top, height)
     pedestal = min(draws.length("pedestal_width", (0.28, 0.45)), 0.4 * width)

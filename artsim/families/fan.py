@@ -118,8 +118,7 @@ def _cage(draws: Draws, cage: float, half: float, motor: float) -> Solid:
 def _blades(draws: Draws, cage: float, depth: float) -> Solid:
     """A propeller about the X axis, within a cage of the given radius and depth."""
     count = draws.integer("blades", 3, 6)
-    hub = draws.length("hub_radius", (0.13, 0.2), of=cage)
-    tip = draws.length("blade_length", (0.78, 0.86), of=cage)
+    hub, tip = draws.lengths(hub_radius=(0.13, 0.2), blade_length=(0.78, 0.86), of=cage)
     reach = 0.2 * depth
     solid = rod((-reach, reach), 0, 0, 0.85 * hub, hub)
     broad = draws.number("blade_spread", (0.45, 0.75)) * 2.0 * np.pi / count

@@ -71,7 +71,7 @@ def _basin_mixer(draws: Draws) -> Assembly:
 
 def _kitchen_mixer(draws: Draws) -> Assembly:
     """A column with a high spout, which mostly turns, and a handle at its side."""
-    radius, height = draws.length("body_radius", (0.018, 0.026)), draws.length("body_height", (0.07, 0.14))
+    radius, height = draws.lengths(body_radius=(0.018, 0.026), body_height=(0.07, 0.14))
     body = _body(draws, radius, height)
     side = draws.side("handle_side")
     out = np.array([0.0, side, 0.0])
@@ -100,7 +100,7 @@ def _kitchen_mixer(draws: Draws) -> Assembly:
 def _three_piece(draws: Draws) -> Assembly:
     """A spout between two handles on one plate."""
     spread = 0.5 * draws.length("width", (0.16, 0.26), (0.14, 0.76), tails=0.25)
-    radius, height = draws.length("foot_radius", (0.018, 0.026)), draws.length("foot_height", (0.02, 0.07))
+    radius, height = draws.lengths(foot_radius=(0.018, 0.026), foot_height=(0.02, 0.07))
     plate = draws.length("plate_thickness", (0.005, 0.012))
     half = radius + draws.length("plate_margin", (0.003, 0.012))
     base = box(half, spread + half, (0, plate), fillet=half, axis=2, steps=5)
@@ -129,7 +129,7 @@ def _three_piece(draws: Draws) -> Assembly:
 
 def _pillar_tap(draws: Draws) -> Assembly:
     """A single tap with a knob on its top that rises as it is turned open."""
-    radius, height = draws.length("body_radius", (0.014, 0.022)), draws.length("height", (0.06, 0.11))
+    radius, height = draws.lengths(body_radius=(0.014, 0.022), height=(0.06, 0.11))
     body = _body(draws, radius, height)
     reach, r = draws.length("depth", (0.06, 0.11)), 0.7 * radius
     s = np.linspace(0.0, 0.5 * np.pi, 7)

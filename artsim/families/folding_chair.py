@@ -111,9 +111,8 @@ def _crossed(draws: Draws) -> Assembly:
         frame_solid += bar.between(foot + y, joint_at + y) + bar.between(joint_at + y - 0.004 * upright, head + y)
     front = foot + draws.length("stretcher_height", (0.08, 0.16)) * direction
     frame_solid += bar.across(front[0], front[2], half)
-    depth = draws.length("seat_depth", (0.32, 0.42))
+    depth, thick = draws.lengths(seat_depth=(0.32, 0.42), back_thickness=(0.012, 0.03))
     # The back rest is in the upper part of the frame, so that the seat has room below it.
-    thick = draws.length("back_thickness", (0.012, 0.03))
     back_low = max(0.35 * above, 0.12)
     tall = (above - back_low) * draws.number("back_share", (0.5, 1.0))
     panel = _panel(draws.within("back"), (-0.5 * thick, -half, above - tall), (0.5 * thick, half, above), 2)
@@ -158,7 +157,7 @@ def _under(draws: Draws) -> Assembly:
     """A seat whose back folds down on it and whose legs fold up under it."""
     bar = _Bar(draws)
     half, depth = 0.5 * draws.length("width", (0.4, 0.6)), draws.length("depth", (0.36, 0.5))
-    seat_z, thick = draws.length("seat_height", (0.25, 0.48)), draws.length("seat_thickness", (0.02, 0.04))
+    seat_z, thick = draws.lengths(seat_height=(0.25, 0.48), seat_thickness=(0.02, 0.04))
     x0, x1 = -0.5 * depth, 0.5 * depth
     rail = max(bar.deep, bar.thick)
     low, high = (x0, -half + 0.5 * bar.thick, seat_z), (x1, half - 0.5 * bar.thick, seat_z + thick)
@@ -194,9 +193,8 @@ def _under(draws: Draws) -> Assembly:
                 limit = min(limit, float(arctan2(ahead, down)) - clear / away - slant)
         chair.add(name, solid, revolute("seat", -way * SIDE, at, 0.0, limit), density=900.0)
     if draws.chance("back", 0.85):
-        tall = draws.length("back_height", (0.25, 0.65))
+        tall, back_thick = draws.lengths(back_height=(0.25, 0.65), back_thickness=(0.012, 0.03))
         hinge = np.array([x1 + rail + GAP + 0.012, 0.0, seat_z + thick + 0.012])
-        back_thick = draws.length("back_thickness", (0.012, 0.03))
         wide = half - 0.01
         near, far = hinge + (-0.5 * back_thick, -wide, 0.05), hinge + (0.5 * back_thick, wide, tall)
         back = _panel(draws.within("back"), near, far, 2)
@@ -212,11 +210,10 @@ def _under(draws: Draws) -> Assembly:
 def _tip_up(draws: Draws) -> Assembly:
     """Seats that tip up between fixed sides, as in a hall; one or more in a row."""
     count = draws.pick("seats", {1: 0.55, 2: 0.3, 3: 0.15})
-    width, depth = draws.length("seat_width", (0.42, 0.56)), draws.length("depth", (0.36, 0.48))
-    side_thick = draws.length("side_thickness", (0.02, 0.06))
-    seat_z, thick = draws.length("seat_height", (0.38, 0.46)), draws.length("seat_thickness", (0.03, 0.1))
+    width, depth, side_thick = draws.lengths(seat_width=(0.42, 0.56), depth=(0.36, 0.48), side_thickness=(0.02, 0.06))
+    seat_z, thick = draws.lengths(seat_height=(0.38, 0.46), seat_thickness=(0.03, 0.1))
     lean = draws.angle("back_lean", (0.05, 0.3))
-    back_tall, back_thick = draws.length("back_height", (0.35, 0.6)), draws.length("back_thickness", (0.03, 0.09))
+    back_tall, back_thick = draws.lengths(back_height=(0.35, 0.6), back_thickness=(0.03, 0.09))
     arm_z = seat_z + draws.length("arm_height", (0.15, 0.25))
     pitch = width + side_thick
     start = -0.5 * count * pitch

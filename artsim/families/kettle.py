@@ -256,7 +256,7 @@ def _back_grip(draws: Draws, pot: Pot) -> Solid:
     high = pot.foot + height * draws.number("handle_top", (0.78, 0.92))
     low = pot.foot + height * draws.number("handle_bottom", (0.12, 0.4))
     reach = max(pot.radius(z) for z in (low, high)) + draws.length("handle_reach", (0.03, 0.05))
-    thick, wide = draws.length("handle_thickness", (0.004, 0.007)), draws.length("handle_width", (0.006, 0.012))
+    thick, wide = draws.lengths(handle_thickness=(0.004, 0.007), handle_width=(0.006, 0.012))
     style = draws.pick("handle", ["loop", "open", "round"])
     start, end = (0.8 * pot.radius(high), high), (0.8 * pot.radius(low), low)
     if style == "loop":

@@ -228,8 +228,7 @@ def _half(draws: Draws, caps: _Caps, most: float) -> tuple[list[list[Cell]], Arr
 def _pivot(draws: Draws, keyboard: Assembly, caps: _Caps) -> None:
     """Two halves that a pivot at the back lets splay."""
     groups, half, _ = _half(draws, caps, 0.8)
-    thick = draws.length("height", (0.008, 0.028))
-    radius = draws.length("pivot_radius", (0.012, 0.02))
+    thick, radius = draws.lengths(height=(0.008, 0.028), pivot_radius=(0.012, 0.02))
     pivot = np.array([half[1] + radius + 0.001, 0.0])
     gap = 0.0015
     joint, decks = None, []
@@ -254,8 +253,7 @@ def _folding(draws: Draws, keyboard: Assembly, caps: _Caps) -> None:
     groups, half, margin = _half(draws, caps, 0.6)
     thick = draws.length("height", (0.004, 0.012))
     axis = thick + caps.height + 2.0 * CLEAR
-    radius = draws.length("hinge_radius", (0.003, 0.005))
-    corner = draws.length("corner_radius", (0.003, 0.015))
+    radius, corner = draws.lengths(hinge_radius=(0.003, 0.005), corner_radius=(0.003, 0.015))
     joint, decks = None, []
     for name, side in _HANDS:
         y = side * (half[0] + radius + GAP)

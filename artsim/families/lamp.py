@@ -46,7 +46,7 @@ def _desk(draws: Draws) -> Assembly:
 
 def _links(draws: Draws) -> tuple[list[Link], Solid, Array | None]:
     """All links; and the rod that runs beside the lower arm, and its foot, if there is one."""
-    half, r = draws.length("arm_radius", (0.006, 0.009)), draws.length("knuckle_radius", (0.010, 0.015))
+    half, r = draws.lengths(arm_radius=(0.006, 0.009), knuckle_radius=(0.010, 0.015))
     links = [Link("base")]
     top = _base(draws, links[0], r)
     if draws.chance("turret", 0.6):
@@ -102,7 +102,7 @@ def _lean(angle: float) -> Array:
 
 def _base(draws: Draws, link: Link, r: float) -> float:
     """The foot; returns the height of its top."""
-    wide, thick = draws.length("foot_radius", (0.06, 0.1)), draws.length("foot_thickness", (0.012, 0.03))
+    wide, thick = draws.lengths(foot_radius=(0.06, 0.1), foot_thickness=(0.012, 0.03))
     kind = draws.pick("foot", {"disc": 0.4, "dome": 0.2, "square": 0.25, "clamp": 0.15})
     if kind == "clamp":
         link.solid += box((-0.06, 0.035), 0.025, 0.012, fillet=0.004)
@@ -156,7 +156,7 @@ def _shade(draws: Draws, links: list[Link], at: Array, side: float, arm_angle: f
         deep = 0.012
         outline = np.array([(0.6 * length, -0.003)])
     else:
-        rim, neck = draws.length("shade_radius", (0.05, 0.085)), draws.length("neck_radius", (0.018, 0.026))
+        rim, neck = draws.lengths(shade_radius=(0.05, 0.085), neck_radius=(0.018, 0.026))
         deep = draws.length("shade_depth", (0.09, 0.15))
         share, level = (0.55, 0.7) if kind == "cone" else (0.9, 0.6)
         outline = np.array([(neck, 0), (neck, 0.25 * deep), (neck + share * (rim - neck), level * deep), (rim, deep)])

@@ -53,9 +53,7 @@ def _pocket(draws: Draws) -> Assembly:
     """A case with a lid that swings over the chimney; the hinge is behind, at +X."""
     half_x = 0.5 * draws.length("depth", (0.026, 0.06))
     half_y = max(half_x * draws.number("width", (0.25, 0.6)), 0.0055)
-    height = draws.length("height", (0.03, 0.055))
-    lid_tall = draws.length("lid_height", (0.014, 0.03))
-    wall = draws.length("wall", (0.0008, 0.0014))
+    height, lid_tall, wall = draws.lengths(height=(0.03, 0.055), lid_height=(0.014, 0.03), wall=(0.0008, 0.0014))
     corner = draws.number("rounding", (0.1, 0.95)) * half_y
     body = box(half_x, half_y, (0, height), fillet=corner, axis=2)
     if draws.chance("foot", 0.5):  # bevelled
@@ -158,7 +156,7 @@ def _disposable(draws: Draws) -> Assembly:
 
 def _long(draws: Draws) -> Assembly:
     """A handle with a trigger and a long nozzle that points up; it may be bent."""
-    handle, nozzle = draws.length("handle_length", (0.08, 0.14)), draws.length("nozzle_length", (0.06, 0.2))
+    handle, nozzle = draws.lengths(handle_length=(0.08, 0.14), nozzle_length=(0.06, 0.2))
     half_x, half_y = 0.5 * draws.length("depth", (0.02, 0.04)), 0.5 * draws.length("width", (0.012, 0.022))
     outline = _outline(draws, half_x, half_y)
     waist = draws.number("waist", (0.75, 1.1))

@@ -105,7 +105,7 @@ def _door(draws: Draws, low: Array, high: Array, drops: bool, handle: str) -> So
     else:
         solid = box(low, high, fillet=0.004)
         solid += box(low + (-0.0015, margins[0], margins[2]), high - (0.004, margins[1], margins[3]))
-    radius, reach = draws.length("handle_radius", (0.005, 0.009)), draws.length("handle_reach", (0.025, 0.042))
+    radius, reach = draws.lengths(handle_radius=(0.005, 0.009), handle_reach=(0.025, 0.042))
     inside = draws.number("handle_inset", (0.08, 0.25))
     start = low + (0, 0.024, inside * tall)
     end = np.array([low[0], start[1], high[2] - inside * tall])

@@ -92,7 +92,7 @@ def build(draws: Draws) -> Assembly:
 def _cooktop(draws: Draws) -> Assembly:
     """A hob to stand on a worktop or to sink into it: a slab with a row of dials, at one side or in front."""
     half = 0.5 * draws.length("width", (0.28, 0.92))
-    depth, height = draws.length("depth", (0.28, 0.56)), draws.length("height", (0.02, 0.12))
+    depth, height = draws.lengths(depth=(0.28, 0.56), height=(0.02, 0.12))
     strip = draws.length("strip_width", (0.06, 0.1))  # for the dials
     beside = draws.chance("knobs_beside", 0.6)
     side = draws.side("knob_side")
@@ -172,7 +172,7 @@ def _door(draws: Draws, low: Array, high: Array, kind: str, reach: float) -> tup
     bottom = draws.length("door_margin_below", (0.05, 0.1)) if tall > 0.3 else 0.05
     margins = [side, side, bottom, high[2] - grip + 0.03]
     if draws.chance("window", 0.75):
-        pane, inset = draws.length("window_thickness", (0.006, 0.02)), draws.length("window_inset", (0.001, 0.006))
+        pane, inset = draws.lengths(window_thickness=(0.006, 0.02), window_inset=(0.001, 0.006))
         solid = windowed_panel(low, high, margins, pane, inset)
     else:
         solid = box(low, high, fillet=0.005)

@@ -30,8 +30,7 @@ class Style:
         self.bins = draws.length("bin_depth", (0.06, 0.1)) if draws.chance("door_bins", 0.7) else 0.0
         self.handle = draws.pick("handle", {"bar": 0.35, "bow": 0.25, "flat": 0.2, "none": 0.2})
         self.level = draws.chance("handle_level", 0.2)  # along an edge instead of upright
-        self.reach = draws.length("handle_reach", (0.035, 0.06))
-        self.radius = draws.length("handle_radius", (0.007, 0.013))
+        self.reach, self.radius = draws.lengths(handle_reach=(0.035, 0.06), handle_radius=(0.007, 0.013))
 
 
 def build(draws: Draws) -> Assembly:

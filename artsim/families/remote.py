@@ -129,7 +129,7 @@ def _battery_cover(draws: Draws, remote: Assembly, body: _Body) -> bool:
 def _keys(draws: Draws, remote: Assembly, body: _Body) -> float:
     """Bands of keys from the top down; returns how far they stand out."""
     face, half = front_face(0.0), body.key_half
-    height, travel = draws.length("key_height", (0.0009, 0.0035)), draws.length("key_travel", (0.0003, 0.0008))
+    height, travel = draws.lengths(key_height=(0.0009, 0.0035), key_travel=(0.0003, 0.0008))
     pitch = min(max(half * draws.number("key_pitch", (0.45, 0.8)), 0.0055), 0.02)
     kind = draws.pick("key_shape", {"square": 0.3, "pill": 0.35, "round": 0.3, "diamond": 0.05})
     fill, shrink = draws.number("key_fill", (0.55, 0.85)), draws.number("key_taper", (0.0, 0.35))

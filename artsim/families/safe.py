@@ -179,7 +179,7 @@ def _door(draws: Draws, s: Shape, combination: bool, opener: str) -> Solid:
 
 def _combination(draws: Draws, x: float, y: float, z: float, radius: float) -> Solid:
     """Combination dial: a skirt, a grip and the mark it is read at."""
-    skirt, reach = draws.length("dial_skirt", (0.006, 0.012)), draws.length("dial_reach", (0.02, 0.03))
+    skirt, reach = draws.lengths(dial_skirt=(0.006, 0.012), dial_reach=(0.02, 0.03))
     solid = rod((x, x - skirt), y, z, radius, 0.85 * radius, 28)
     solid += rod((x - 0.5 * skirt, x - skirt - reach), y, z, 0.55 * radius, 0.45 * radius, 16)
     mark = (y - 0.03 * radius - 0.001, y + 0.03 * radius + 0.001)

@@ -15,8 +15,7 @@ def shopping_cart(draws: Draws) -> Assembly:
     narrow, track = draws.number("front_width", (0.7, 0.98)), draws.number("track", (0.75, 0.95)) * half
     # Two casters beside each other have room to swivel.
     wheels = Wheels(draws, (0.045, 0.07), (0.024, 0.036), 0.5 * narrow * track)
-    low, high = draws.length("basket_floor", (0.35, 0.55)), draws.length("height", (0.75, 0.95))
-    lean = draws.length("basket_lean", (0.02, 0.14))
+    low, high, lean = draws.lengths(basket_floor=(0.35, 0.55), height=(0.75, 0.95), basket_lean=(0.02, 0.14))
 
     # Corners of the basket: front then back, at the floor then at the rim.
     def corner(end: tuple[bool, float], up: bool) -> Array:

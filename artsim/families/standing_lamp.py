@@ -80,7 +80,7 @@ def _foot(draws: Draws, kind: str, wide: float, thick: float, height: float, rad
         return legs + rod(0, 0, (head - 0.02, head + 0.02), 1.8 * radius + size, sections=16), head
     top = draws.length("vase_height", (0.6, 0.85), of=height)
     shares = np.linspace(0.0, 1.0, 8)
-    belly, waist = draws.length("vase_radius", (0.5, 1.0), of=wide), draws.length("vase_waist", (0.2, 0.5), of=wide)
+    belly, waist = draws.lengths(vase_radius=(0.5, 1.0), vase_waist=(0.2, 0.5), of=wide)
     bulge = power(sin(np.pi * (0.15 + 0.85 * shares)), draws.number("vase_bulge", (0.7, 2.5)))
     radii = waist + (belly - waist) * bulge
     radii[-1] = max(1.3 * radius, 0.3 * waist)
@@ -123,7 +123,7 @@ def _switch(draws: Draws, lamp: Assembly, radius: float, height: float) -> None:
 
 def spotlight(draws: Draws) -> Assembly:
     """A head that tips in a yoke, which turns on a mount."""
-    radius, long = draws.length("head_radius", (0.03, 0.09)), draws.length("head_length", (0.06, 0.2))
+    radius, long = draws.lengths(head_radius=(0.03, 0.09), head_length=(0.06, 0.2))
     thick = 0.08 * radius + 0.002
     reach = float(hypot(radius, 0.6 * long)) + 0.012
     mount = draws.pick("mount", ["disc", "pole", "legs"])
@@ -144,8 +144,7 @@ def spotlight(draws: Draws) -> Assembly:
         yoke += hull_of(box(0.012, (a, b), (low, low + thick)), rod(0, (a, b), center[2], 0.012, sections=14))
     lamp.add("yoke", yoke, continuous("base", UP, (0, 0, high)))
     # The front of the head looks to -X.
-    rim = draws.length("front_radius", (0.75, 1.0), of=radius)
-    back = draws.length("back_radius", (0.3, 0.95), of=radius)
+    rim, back = draws.lengths(front_radius=(0.75, 1.0), back_radius=(0.3, 0.95), of=radius)
     start, end = np.array([-0.55 * long, 0, center[2]]), np.array([0.45 * long, 0, center[2]])
     head = cylinder(start, center, 0.97 * rim, 0.97 * radius, 24) + cylinder(center, end, 0.97 * radius, back, 24)
     head += ring(start, (1, 0, 0), 0.8 * rim, rim, 0.012, 24)

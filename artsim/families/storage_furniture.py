@@ -164,7 +164,7 @@ def _carcass(
 def _top(draws: Draws, kind: str, x: float, y: float, top: float) -> Solid:
     if kind == "wall" or draws.pick("top", {"none": 0.25, "board": 0.75}) == "none":
         return Solid()
-    over, thick = draws.length("top_overhang", (0.0, 0.035)), draws.length("top_thickness", (0.012, 0.04))
+    over, thick = draws.lengths(top_overhang=(0.0, 0.035), top_thickness=(0.012, 0.04))
     front = -x - 0.022
     solid = box((front - over, x), y + over, (top - 0.001, top + thick))
     if kind == "tall" and draws.chance("cornice", 0.4):
@@ -184,7 +184,7 @@ def _stand(draws: Draws, kind: str, x: float, y: float, height: float, board: fl
         return frame((setback - x, -wide, 0), (x, wide, height + 0.001), [board] * 4, 0, 1)
     signs = [(sx, sy) for sx in (-1, 1) for sy in (-1, 1)]
     if height < 0.2 and draws.chance("brackets", 0.25):  # an angle at each corner
-        arm, thick = draws.length("bracket_length", (0.06, 0.12)), draws.length("bracket_thickness", (0.018, 0.03))
+        arm, thick = draws.lengths(bracket_length=(0.06, 0.12), bracket_thickness=(0.018, 0.03))
         levels = ((1.0, height + 0.001), (0.6, 0.0))
         return union(
             hull([(sx * (x - u * p), sy * (y - v * p), z) for p, z in levels for u in (0.0, du) for v in (0.0, dv)])

@@ -68,7 +68,7 @@ def _apron(draws: Draws, table: Assembly) -> None:
     width, depth = float(np.clip(width, 0.34, 2.4)), float(np.clip(depth, 0.3, 1.1))
     if draws.chance("unusual", 0.3):
         depth, width, height = unusual_sides(draws, LEAST_SHARES, MOST_SHARES, (0.28, 0.34, 0.3))
-    thick, over = draws.length("top_thickness", (0.014, 0.06)), draws.length("top_overhang", (0.0, 0.06))
+    thick, over = draws.lengths(top_thickness=(0.014, 0.06), top_overhang=(0.0, 0.06))
     size = min(height * draws.number("leg_width", (0.04, 0.12)), 0.2 * depth, 0.15 * width)
     over = min(over, 0.12 * depth)
     top, x, y = height - thick, depth / 2 - over, width / 2 - over
@@ -111,7 +111,7 @@ def _pedestals(draws: Draws, table: Assembly) -> None:
     """A desk: cases at one or both ends, legs or a panel elsewhere, a flat case or a tray between."""
     height = draws.length("height", (0.62, 0.85))
     width, depth = height * draws.number("width", (1.3, 3.4)), height * draws.number("depth", (0.5, 1.4))
-    thick, over = draws.length("top_thickness", (0.016, 0.05)), draws.length("top_overhang", (0.0, 0.05))
+    thick, over = draws.lengths(top_thickness=(0.016, 0.05), top_overhang=(0.0, 0.05))
     top, x, y = height - thick, depth / 2 - over, width / 2 - over
     table.body += table_top(draws, depth, width, top, height)
     style = _style(draws)
@@ -176,7 +176,7 @@ def _case(draws: Draws, table: Assembly) -> None:
     width, depth = max(width, 0.34), float(np.clip(depth, 0.28, 0.9))
     if draws.chance("unusual", 0.45):
         depth, width, height = unusual_sides(draws, LEAST_SHARES, MOST_SHARES, (0.28, 0.34, 0.28))
-    thick, over = draws.length("top_thickness", (0.012, 0.05)), draws.length("top_overhang", (0.0, 0.05))
+    thick, over = draws.lengths(top_thickness=(0.012, 0.05), top_overhang=(0.0, 0.05))
     top, x, y = height - thick, depth / 2 - min(over, 0.1 * depth), width / 2 - over
     style = _style(draws, depth > width)
     stand = draws.pick("stand", {"legs": 0.55, "plinth": 0.3, "wheels": 0.15})

@@ -22,7 +22,7 @@ def build(draws: Draws) -> Assembly:
     wide = draws.length("slot_width", (0.024, 0.044))
     pitch = wide + draws.length("slot_gap", (0.02, 0.035))
     half = 0.5 * (count - 1) * pitch + 0.5 * wide + draws.length("side_width", (0.024, 0.065))
-    foot, height = draws.length("foot_height", (0.005, 0.025)), draws.length("height", (0.13, 0.25))
+    foot, height = draws.lengths(foot_height=(0.005, 0.025), height=(0.13, 0.25))
     low, high = np.array([0.0, -half, foot]), np.array([length, half, foot + height])
     shape = draws.pick("shape", ["box", "arch", "loaf", "block"])
     block = _block(draws, shape, low, high, half - 0.5 * (count - 1) * pitch - 0.5 * wide)

@@ -34,8 +34,7 @@ class _Cover:
 
 def build(draws: Draws) -> Assembly:
     """A toilet; one sits down facing -X. Seat and lid lie on the bowl at rest."""
-    length, width = draws.length("bowl_length", (0.38, 0.56)), draws.length("width", (0.33, 0.42))
-    height = draws.length("bowl_height", (0.34, 0.48))
+    length, width, height = draws.lengths(bowl_length=(0.38, 0.56), width=(0.33, 0.42), bowl_height=(0.34, 0.48))
     squareness = {"ellipse": 2.0, "full": draws.number("bowl_fullness", (2.0, 2.6)),
                   "square": draws.number("bowl_squareness", (3.0, 6.0))}  # fmt: skip
     power = draws.one_of("bowl", squareness, (0.4, 0.4, 0.2))
@@ -120,7 +119,7 @@ def _bowl(draws: Draws, length: float, width: float, height: float, power: float
 
 def _low_cistern(draws: Draws, moving: list[Moving], back: float, width: float, height: float) -> Solid:
     """On the deck, right behind the bowl."""
-    deep, tall = draws.length("cistern_depth", (0.14, 0.22)), draws.length("cistern_height", (0.28, 0.42))
+    deep, tall = draws.lengths(cistern_depth=(0.14, 0.22), cistern_height=(0.28, 0.42))
     half = 0.5 * width * draws.number("cistern_to_bowl", (0.85, 1.35))
     start = back - 0.001
     foot = height - draws.length("cistern_drop", (0.0, 0.04))
@@ -138,8 +137,7 @@ def _low_cistern(draws: Draws, moving: list[Moving], back: float, width: float, 
         box((start - 0.05, start + 0.02), 0.3 * half, (0.5 * height, 0.5 * height + 0.03)),
     )
     flush = draws.pick("flush", {"lever": 0.35, "side lever": 0.15, "button": 0.25, "two buttons": 0.25})
-    over = draws.length("cistern_lid_overhang", (0.004, 0.02))
-    thick = draws.length("cistern_lid_thickness", (0.02, 0.045))
+    over, thick = draws.lengths(cistern_lid_overhang=(0.004, 0.02), cistern_lid_thickness=(0.02, 0.045))
     low, high = (start - over, -half - over, top + GAP), (start + deep + over, half + over, top + GAP + thick)
     middle = start + 0.5 * deep
     buttons = flush in ("button", "two buttons")
@@ -169,7 +167,7 @@ def _low_cistern(draws: Draws, moving: list[Moving], back: float, width: float, 
 
 def _lever(draws: Draws, foot: Vector, out: Vector, along: Vector) -> Moving:
     """A handle on a pivot in a wall; pressed down it turns."""
-    long, thick = draws.length("lever_length", (0.05, 0.1)), draws.length("lever_thickness", (0.004, 0.008))
+    long, thick = draws.lengths(lever_length=(0.05, 0.1), lever_thickness=(0.004, 0.008))
     foot, out, along, reach = np.asarray(foot), np.asarray(out), np.asarray(along), 0.02
     hub = foot + reach * out
     radius = draws.length("lever_pivot", (0.009, 0.014))
@@ -203,7 +201,7 @@ def _high_cistern(draws: Draws, moving: list[Moving], back: float, height: float
     """Up on a pipe, with a chain to pull."""
     up = draws.length("pipe_length", (0.6, 1.3))
     half = 0.5 * draws.length("cistern_width", (0.34, 0.52))
-    deep, tall = draws.length("cistern_depth", (0.15, 0.2)), draws.length("cistern_height", (0.2, 0.32))
+    deep, tall = draws.lengths(cistern_depth=(0.15, 0.2), cistern_height=(0.2, 0.32))
     x = back + 0.05
     solid = tube([(back - 0.03, 0, height - 0.06), (x, 0, height - 0.04), (x, 0, height + up + 0.01)], 0.02, 14)
     low = height + up

@@ -152,11 +152,8 @@ def _half_of(plate: Solid, side: float) -> Solid:
 def _wheelie(draws: Draws) -> Assembly:
     """Household bin: tapered body, lid hinged at the grip, two wheels below the back."""
     x, y = 0.5 * draws.length("depth", (0.44, 0.68)), 0.5 * draws.length("width", (0.4, 0.64))
-    height = draws.length("height", (0.75, 1.05))
-    radius = draws.length("corner_radius", (0.02, 0.06))
-    taper = draws.length("narrowing", (0.03, 0.07))
-    wheel = draws.length("wheel_radius", (0.07, 0.12))
-    lift = draws.length("clearance", (0.01, 0.03))
+    height, radius, taper = draws.lengths(height=(0.75, 1.05), corner_radius=(0.02, 0.06), narrowing=(0.03, 0.07))
+    wheel, lift = draws.lengths(wheel_radius=(0.07, 0.12), clearance=(0.01, 0.03))
     profile = [(0.0, taper), (0.86, 0.012), (0.865, 0.0), (1.0, 0.0)]
     body = rounded_tray((-x, -y, lift), (x, y, height), 0.006, radius, profile)
     inner = y - 0.6 * taper

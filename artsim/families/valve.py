@@ -47,8 +47,7 @@ def _ends(draws: Draws, half: float, pipe: float) -> Solid:
     """Flanges with bolts, or threaded collars with six sides, at both ends of the pipe."""
     solid = Solid()
     flanged, bolts = draws.chance("flanges", 0.65), draws.pick("flange_bolts", [4, 6, 8])
-    thick = draws.length("flange_thickness", (0.25, 0.4), of=pipe)
-    wide = draws.length("flange_radius", (1.6, FLANGE), of=pipe)
+    thick, wide = draws.lengths(flange_thickness=(0.25, 0.4), flange_radius=(1.6, FLANGE), of=pipe)
     for side in (-1.0, 1.0):
         end = np.array([0.0, side * half, 0.0])
         inward = np.array([0.0, -side, 0.0])
@@ -75,8 +74,7 @@ def _gate_valve(draws: Draws, pipe: float, room: float) -> tuple[Solid, Solid, f
     solid += rod(0, 0, (seat - thick, seat + thick), wide, sections=24)
     for spot in circle((0, 0, seat), UP, 0.5 * (wide + neck), draws.pick("bonnet_bolts", [4, 6])):
         solid += cylinder(spot - (0, 0, 1.4 * thick), spot + (0, 0, 1.5 * thick), 0.13 * pipe, sections=6)
-    stem = draws.length("stem_radius", (0.16, 0.24), of=pipe)
-    travel = draws.length("wheel_travel", (0.6, 1.4), of=pipe)
+    stem, travel = draws.lengths(stem_radius=(0.16, 0.24), wheel_travel=(0.6, 1.4), of=pipe)
     gland = max(2.2 * stem, 0.45 * neck)
     bottom = seat + 0.5 * thick
     top = bottom + travel + draws.length("gland_height", (0.3, 0.7), of=pipe)

@@ -16,8 +16,7 @@ def wagon(draws: Draws) -> Assembly:
     wheels = Wheels(draws, (0.07, 0.15), (0.03, 0.06))
     length, half = draws.length("depth", (0.7, 1.1)), 0.5 * draws.length("width", (0.4, 0.64))
     floor = 2.0 * wheels.radius + 0.03 + 3.0 * GAP
-    tall = draws.length("tray_height", (0.08, 0.3))
-    radius = draws.length("tray_corner", (0.01, 0.08))
+    tall, radius = draws.lengths(tray_height=(0.08, 0.3), tray_corner=(0.01, 0.08))
     if draws.chance("moulded", 0.5):
         profile = ((0.0, draws.length("tray_taper", (0.0, 0.04))), (1.0, 0.0))
         low, high = (-0.5 * length, -half, floor), (0.5 * length, half, floor + tall)
@@ -104,7 +103,7 @@ def hand_cart(draws: Draws) -> Assembly:
     body += rod(x_axle, (-reach, reach), z, 0.015, sections=12)
     for s in (-1.0, 1.0):
         body += box(about(x_axle, 0.04), about(s * 0.7 * half, 0.02), (min(z, low) - 0.02, low + 0.002))
-    r, reach = draws.length("shaft_radius", (0.012, 0.02)), draws.length("shaft_length", (0.5, 1.1))
+    r, reach = draws.lengths(shaft_radius=(0.012, 0.02), shaft_length=(0.5, 1.1))
     under = low - r
     tip = (front - reach, half * 0.75, under + draws.length("shaft_rise", (-0.1, 0.25)))
     for s in (-1.0, 1.0):

@@ -41,8 +41,7 @@ def build(draws: Draws) -> Assembly:
         count = max(count, 2)
     width = draws.length("width", (0.35, 1.0)) * (count if kind != "hung" else 1)  # drawn for one light
     height = draws.length("height", (0.5, 1.8)) if kind != "hung" else draws.length("height", (1.3, 2.0), of=width)
-    bar = draws.length("frame_width", (0.035, 0.065))
-    depth = draws.length("depth", (0.05, 0.22))
+    bar, depth = draws.lengths(frame_width=(0.035, 0.065), depth=(0.05, 0.22))
     style = _Style(draws, 1.0 if kind == "hinged" else 0.035)
     if kind != "hinged":
         depth = max(depth, (count if kind == "sliding" else 2) * (style.thick + GAP) + 0.015)
@@ -59,7 +58,7 @@ def _frame(draws: Draws, width: float, height: float, depth: float, bar: float) 
     x0, x1, y = -depth / 2, depth / 2, width / 2
     solid = frame((x0, -y - bar, -bar), (x1, y + bar, height + bar), [bar] * 4)
     if draws.chance("sill", 0.4):
-        out, over = draws.length("sill_depth", (0.02, 0.12)), draws.length("sill_overhang", (0.0, 0.08))
+        out, over = draws.lengths(sill_depth=(0.02, 0.12), sill_overhang=(0.0, 0.08))
         solid += box((x0 - out, x1), y + bar + over, (-bar - 0.02, -bar + 0.006), fillet=0.006, axis=1)
     around = draws.pick("surround", {"casing": 0.25, "some wall": 0.15, "wall": 0.15, "none": 0.45})
     if around == "casing":  # level with the frame so that sashes can pass

@@ -133,6 +133,10 @@ class Draws:
         """A :meth:`number` of metres; or a share ``of`` a length, which is kept in metres."""
         return self.number(name, usual, widest, tails=tails, unit="m", of=of)
 
+    def lengths(self, *, of: float = 1.0, **usual: Interval) -> tuple[float, ...]:
+        """Several :meth:`length` by name, in order: ``lengths(width=(0.4, 0.6), height=(0.1, 0.2))``."""
+        return tuple(self.length(name, span, of=of) for name, span in usual.items())
+
     def angle(self, name: str, usual: Interval, widest: Interval | None = None, *, tails: float = 0.25) -> float:
         """A :meth:`number` of radians."""
         return self.number(name, usual, widest, tails=tails, unit="rad")
