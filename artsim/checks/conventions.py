@@ -156,6 +156,8 @@ def doubts(objects: Sequence[ArticulatedObject], names: Sequence[str]) -> Iterat
     name, what : str
         Of the object, or "all"; and what is wrong, with its fix.
     """
+    if not objects:
+        return
     sides = [opening(obj) for obj in objects]
     usual, count = Counter(side for side in sides if side).most_common(1)[0] if any(sides) else ("", 0)
     if usual == "+x":

@@ -101,7 +101,7 @@ def doubts_of(files: list[Path]) -> dict[str, str]:
 @pytest.mark.parametrize("yaw", [90, 180, -90])
 def test_an_object_that_faces_elsewhere_is_named_and_its_fix_mends_it(yaw: int, tmp_path: Path) -> None:
     others = [fridge(tmp_path / f"{n}.urdf", 1.0 + 0.1 * n) for n in range(3)]
-    assert doubts_of(others) == {}
+    assert doubts_of(others) == doubts_of([]) == {}
     wrong = f'<origin rpy="0 0 {np.deg2rad(yaw)}"/>'
     found = doubts_of([*others, fridge(tmp_path / "turned.urdf", turns=(wrong,))])
     assert list(found) == ["turned"]
