@@ -7,12 +7,13 @@ import re
 import subprocess
 import sys
 from types import ModuleType
-from typing import Any, get_args
+from typing import Any
 
 import pytest
 
 import artperl.commands.verbs
 import artsim.commands.verbs
+from artsim.common.program import verb_name
 from tests.conftest import ROOT, installed
 
 PAGE = (ROOT / "docs" / "api.md").read_text()
@@ -56,13 +57,9 @@ def test_completion_offers_public_names_alone(package: str) -> None:
 
 @pytest.mark.parametrize("program", ["artsim", "artperl"])
 def test_page_lists_every_command(program: str) -> None:
-    verbs = get_args({"artsim": artsim.commands.verbs.Verb, "artperl": artperl.commands.verbs.Verb}[program])
+    groups = {"artsim": artsim.commands.verbs.VERBS, "artperl": artperl.commands.verbs.VERBS}[program]
     listed = PAGE[PAGE.index("## Commands") :]
-    # Without a name of its own, a verb is called by its class.
-    names = {
-        get_args(verb)[1].name if get_args(verb) else re.sub("(?<!^)(?=[A-Z])", "-", verb.__name__).lower()
-        for verb in verbs
-    }
+    names = {verb_name(verb) for verbs in groups.values() for verb in verbs}
     assert names == set(re.findall(rf"`{program} ([a-z][a-z-]*)`", listed))
 
 

@@ -22,6 +22,7 @@ import tyro
 
 import artperl.commands.verbs
 import artsim.commands.verbs
+from artsim.common.program import parser_of
 from tests.conftest import ROOT
 
 README = ROOT / "README.md"
@@ -33,10 +34,10 @@ ALONE = [
 """Pages whose blocks run in their order, after those of README; the tests of ManiSkill cover its page."""
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").rglob("*.md")), *sorted(ROOT.glob("examples/*/README.md"))]
 PROGRAMS: dict[str, Any] = {
-    "artsim": artsim.commands.verbs.Verb,
-    "artperl": artperl.commands.verbs.Verb,
-    "generate.py": artsim.commands.verbs.Generate,
-    "train.py": artperl.commands.verbs.Train,
+    "artsim": parser_of(artsim.commands.verbs.VERBS),
+    "artperl": parser_of(artperl.commands.verbs.VERBS),
+    "generate.py": parser_of({"": (artsim.commands.verbs.Generate,)}),
+    "train.py": parser_of({"": (artperl.commands.verbs.Train,)}),
 }
 BLOCKS = [
     (kind, block)

@@ -1,5 +1,6 @@
 """The verbs ``artperl artimage``, ``robustness`` and ``ablation``: the estimators of several categories are tested."""
 
+import logging
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,14 +8,14 @@ from typing import Literal
 
 import tyro
 
-from artsim.common.outputs import check_output
-from artsim.common.progress import say
+from artsim.common.program import Figures
 from artsim.errors import ConfigError
-from artsim.runs.kept import write_kept
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class _Tested:
+class _Tested(Figures):
     """Which estimators are tested, and on which categories."""
 
     estimators: tyro.conf.Positional[Path | None] = None
@@ -23,15 +24,11 @@ class _Tested:
     """Categories; by default those of ArtImage."""
     partnet: Path | None = Path(os.environ["ARTSIM_PARTNET_DIR"]) if "ARTSIM_PARTNET_DIR" in os.environ else None
     """Unpacked PartNet-Mobility, for real objects; by default what ARTSIM_PARTNET_DIR names."""
-    json: Path | None = None
-    """Write the figures to this file."""
 
     def categories(self) -> tuple[str, ...]:
         """The categories."""
         from artperl.data.categories import ARTIMAGE
 
-        if self.json is not None:
-            check_output(self.json)
         return self.category or tuple(ARTIMAGE)
 
 
@@ -69,7 +66,7 @@ class ArtImage(_Tested):
             raise ConfigError("without --root, the method is full", "method", "leave it out")
         if self.root is not None:
             figures = run_original(
-                self.root, categories, self.estimators, self.method, self.views, self.num_points, True, say
+                self.root, categories, self.estimators, self.method, self.views, self.num_points, True, self.say
             )
         else:
             rows = self.rows or tuple(
@@ -79,19 +76,19 @@ class ArtImage(_Tested):
                 and not (row.startswith("real") and self.partnet is None)
             )
             for row in (row for row in ROWS if not self.rows and row not in rows):
-                print(f"{row}: left out, since {'--real-weights' if self.partnet else '--partnet'} is not given")
+                log.warning(f"{row}: left out, since {'--real-weights' if self.partnet else '--partnet'} is not given")
             figures = run_benchmark(
                 rows, categories, self.estimators, self.real_weights, self.partnet, self.objects,
-                self.views or VIEWS, self.num_points, True, say, self.seen_from,
+                self.views or VIEWS, self.num_points, True, self.say, self.seen_from,
             )  # fmt: skip
-        write_kept(self.json, figures, indent=1)
+        self.finish(figures)
 
 
 @dataclass(frozen=True)
 class Robustness(_Tested):
     """Test the estimators where it is difficult: sensors, occluders, bad masks, few points.
 
-    With --json, the same command continues a run that was stopped.
+    With --json FILE, the same command continues a run that was stopped.
     """
 
     rows: tuple[Literal["procedural", "real", "real_all"], ...] = ()
@@ -111,16 +108,16 @@ class Robustness(_Tested):
         sources = self.rows or (("procedural",) if self.partnet is None else ("procedural", "real"))
         figures = run_robustness(
             sources, categories, self.conditions or tuple(CONDITIONS), self.estimators, self.partnet, self.objects,
-            self.views, self.json, True, say,
+            self.views, self.json_file, True, self.say,
         )  # fmt: skip
-        write_kept(self.json, figures, indent=1)
+        self.finish(figures)
 
 
 @dataclass(frozen=True)
 class Ablation(_Tested):
     """Measure what each stage brings: the estimators without one stage after the other, on validation objects.
 
-    With --json, the same command continues a run that was stopped.
+    With --json FILE, the same command continues a run that was stopped.
     """
 
     views: int = 32
@@ -129,5 +126,8 @@ class Ablation(_Tested):
     def run(self) -> None:
         from artperl.evaluation.ablation import run_ablation, verdict_lines
 
-        record = run_ablation(self.categories(), self.estimators, self.partnet, self.views, self.json, True, say)
-        print("\n".join(verdict_lines(record)))
+        record = run_ablation(
+            self.categories(), self.estimators, self.partnet, self.views, self.json_file, True, self.say
+        )
+        self.say("\n".join(verdict_lines(record)))
+        self.finish(record)

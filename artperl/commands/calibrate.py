@@ -1,17 +1,21 @@
 """The verb ``artperl calibrate``."""
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
 
+from artsim.common.program import Figures
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
 from artsim.model.draws import StateOptions, ViewOptions
 
+log = logging.getLogger(__name__)
+
 
 @dataclass(frozen=True)
-class Calibrate:
+class Calibrate(Figures):
     """Recalibrate the confidence of an estimator, on procedural objects outside training and test.
 
     Training does so by itself. Do it again for an estimator that shall judge other objects, such as those of some
@@ -70,5 +74,7 @@ class Calibrate:
         foreign = judge(estimator, foreign_samples(estimator.categories, 12))
         made = calibrated(estimator, scored, foreign)
         save_estimator(made, self.out or folder, read_settings(folder)["about"])
-        print(table(summary(scored)))
-        print(f"these figures are of the confidence before; the new one is in {self.out or folder}")
+        figures = summary(scored)
+        self.say(table(figures))
+        self.finish(figures)
+        log.info(f"these figures are of the confidence before; the new one is in {self.out or folder}")

@@ -1,5 +1,6 @@
 """The verb ``artperl demo``: from objects, made and loaded, to labelled clouds and an estimator, on one page."""
 
+import logging
 import os
 import sys
 from dataclasses import dataclass
@@ -7,6 +8,8 @@ from pathlib import Path
 
 import artsim
 from artsim.common.extras import require_extra
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,7 @@ class Demo:
 
         # 6. ArtPERL: learn the poses of a laptop's parts from fresh objects, and test on unseen ones.
         training = Training(PRESETS["quick"], self.out / "training")
-        print("\nlearning the poses of a laptop's parts, a few minutes ...", flush=True)
+        log.info("learning the poses of a laptop's parts, a few minutes ...")
         training.run()
         print((training.out / "table.txt").read_text())
 

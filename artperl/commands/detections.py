@@ -1,19 +1,23 @@
 """The verb ``artperl detections``."""
 
+import logging
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 
 from artperl.evaluation.realistic_detections import Flaws
 from artsim.common.outputs import write_output
+from artsim.common.program import Figures
 from artsim.errors import ConfigError
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class MakeDetections:
+class MakeDetections(Figures):
     """Detect the objects of scenes: COCO's results, with masks. By default, detections are made from the ground truth.
 
     Borders of masks are off, pieces are missing or too much, objects are missed, found twice, confused, or made up. The
@@ -44,15 +48,19 @@ class MakeDetections:
             found = realistic_detections(scenes, self.flaws, self.seed)
         else:
             from artperl.detection.detector import load_detector
-            from artperl.evaluation.mask_precision import detect, precision_lines
+            from artperl.evaluation.mask_precision import detect, mask_precision, precision_lines
 
             if (self.flaws, self.seed) != (Flaws(), 0):
                 raise ConfigError("a detector has its own flaws, and no chance", "flaws, seed", "leave them out")
             found = detect(scenes, load_detector(self.detector))
         write_output(self.out, json_bytes(found))
-        if self.detector is not None:
-            for line in precision_lines(scenes, found):
-                print(line)
-        counts = ", ".join(f"{n} {name}" for name, n in sorted(Counter(d["category"] for d in found).items()))
+        counts = Counter(d["category"] for d in found)
         there = sum(obj.visible_fraction > 0 for entry in scenes.entries for obj in entry.objects)
-        print(f"wrote {self.out}: {len(found)} detections ({counts}) of {there} objects in {len(scenes)} images")
+        told = ", ".join(f"{n} {name}" for name, n in sorted(counts.items()))
+        figures: dict[str, Any] = {"detections": counts, "objects": there, "images": len(scenes)}
+        if self.detector is not None:
+            figures["masks"] = mask_precision(scenes, found)
+            for line in precision_lines(figures["masks"]):
+                self.say(line)
+        self.finish(figures)
+        log.info(f"wrote {self.out}: {len(found)} detections ({told}) of {there} objects in {len(scenes)} images")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import sys
 from collections.abc import Callable
 from contextlib import closing
@@ -12,18 +13,21 @@ from itertools import tee
 from typing import TYPE_CHECKING, Any
 
 from artperl.commands.estimate_many import with_warnings
-from artperl.commands.estimate_options import STDOUT, EstimateOptions
+from artperl.commands.estimate_options import EstimateOptions
 from artperl.commands.estimate_scene import estimate_scene, is_image_pair
 from artperl.commands.estimators import estimator_folder
 from artperl.commands.resumed_lines import line_name
 from artsim.common.files import read_json
 from artsim.common.outputs import check_output, write_output
+from artsim.common.program import STDOUT
 from artsim.common.progress import track
 from artsim.errors import ConfigError
 from artsim.export.folders import new_folder
 
 if TYPE_CHECKING:
     from artperl.methods.protocol import Method
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -124,7 +128,7 @@ class Estimate(EstimateOptions):
         file, clouds = self.clouds[0], [read_cloud(file, self.input_options()) for file in self.clouds]
         notes = [text for cloud in clouds for text in cloud.notes]
         for text in notes:
-            print(f"note: {text}", file=sys.stderr)
+            log.info("note: %s", text)
         points: Any = [cloud.points for cloud in clouds]
         if self.poses is None:
             points = points[0]
@@ -142,7 +146,7 @@ class Estimate(EstimateOptions):
         if self.view is not None:
             write_output(self.view, page(result, points, f"{file.name}: {self.category}").encode())
         for text in result.warnings:
-            print(f"warning: {text}", file=sys.stderr)
+            log.warning(text)
         if self.out == STDOUT:
             print(json.dumps(result.to_dict() | {"notes": notes}, indent=1))
             return
@@ -162,7 +166,7 @@ class Estimate(EstimateOptions):
         with Lines(None if self.out in (None, STDOUT) else self.out, setup) as lines:
             failed, done, total = 0, lines.done(), len(clouds)
             if done:
-                print(f"note: {len(done)} lines are in {self.out} already", file=sys.stderr)
+                log.info(f"note: {len(done)} lines are in {self.out} already")
             asked, told = tee(entry for entry in clouds if line_name(entry.file, entry.sample) not in done)
             if self.ray is not None:  # processes of nodes run in folders of their own
                 options, asked = options.absolute(), (replace(own, file=own.file.absolute()) for own in asked)
@@ -174,5 +178,5 @@ class Estimate(EstimateOptions):
                     progress.update()
         if failed:
             kind = "clouds" if clouds.shards else "files"
-            print(f"error: {failed} of {total} {kind} failed; each line with an 'error' says why", file=sys.stderr)
+            log.error(f"{failed} of {total} {kind} failed; each line with an 'error' says why")
             sys.exit(1)

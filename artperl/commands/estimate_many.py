@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import logging
 import os
-import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from artperl.core.estimate import Estimate as Result
     from artperl.inputs import Cloud, InputOptions
     from artperl.methods.protocol import Method
+
+log = logging.getLogger(__name__)
 
 _NAMED = 8
 """Files that are named where some are left out."""
@@ -84,7 +86,7 @@ class Clouds:
         if skipped:
             names = ", ".join(path.name for path in skipped[:_NAMED]) + (", ..." if len(skipped) > _NAMED else "")
             kind = "clouds" if options.intrinsics is None else "depth images"
-            print(f"note: left out, since they are no {kind}: {names}", file=sys.stderr)
+            log.info(f"note: left out, since they are no {kind}: {names}")
         if not files and not shards:
             hint = "" if options.intrinsics else "; depth images need --intrinsics camera.json"
             raise ConfigError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -12,8 +12,6 @@ from artperl.methods import StoredMethod
 
 if TYPE_CHECKING:
     from artperl.inputs import InputOptions
-
-STDOUT = Path("-")
 
 
 @dataclass(frozen=True)
@@ -24,9 +22,9 @@ class EstimateOptions:
     """Files, or folders of them; datasets of artsim, and shards (.tar)."""
     category: str = "laptop"
     """An estimator that comes with the package, by its name; or its folder; or the folder of a training run."""
-    out: Path | None = None
-    """Write all of it here, as .json or as .npz with the part of every point too; - prints JSON instead of the list. Of
-    several files: .jsonl, a line each; rerun the command to resume."""
+    out: Annotated[Path | None, tyro.conf.arg(aliases=("--json",))] = None
+    """Write all of it here, as .json or as .npz with the part of every point too; - prints JSON instead of the list,
+    and so does --json alone. Of several files: .jsonl, a line each; rerun the command to resume."""
     view: Path | None = None
     """Write a page for a browser here: the cloud by part, boxes, joint axes, and the way to them."""
     urdf: Path | None = None

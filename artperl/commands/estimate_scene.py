@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import json
-import sys
+import logging
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from PIL import Image
 
-from artperl.commands.estimate_options import STDOUT, EstimateOptions
+from artperl.commands.estimate_options import EstimateOptions
 from artperl.commands.estimators import named_estimators
 from artperl.detection import SHIPPED
 from artsim.common.outputs import write_output
+from artsim.common.program import STDOUT
 from artsim.errors import ConfigError
 
 if TYPE_CHECKING:
     from artperl.inputs.detections import Detections
     from artperl.scene.estimator import SceneEstimate
+
+log = logging.getLogger(__name__)
 
 _PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".webp", ".tif", ".tiff")
 
@@ -62,9 +65,9 @@ def estimate_scene(options: EstimateOptions) -> None:
     given = None if options.detections is None else _read_detections(options, image, size)
     detections = given or Detections((), (), (f"objects are found by {estimator.detector}",))
     for text in (*depth.notes, *detections.notes):
-        print(f"note: {text}", file=sys.stderr)
+        log.info("note: %s", text)
     for text in (*depth.warnings, *(f"left out: {text}" for text in detections.skipped)):
-        print(f"warning: {text}", file=sys.stderr)
+        log.warning(text)
     result = estimator(rgb, depth.values, depth.K, None if given is None else given.all)
     if options.picture is not None:
         write_output(options.picture, draw_scene(rgb, depth.K, result))

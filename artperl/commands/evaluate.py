@@ -6,16 +6,15 @@ from typing import Any, Literal
 
 import tyro
 
-from artsim.common.outputs import check_output
+from artsim.common.program import Figures
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
 from artsim.loading.roots import PackageRoots
 from artsim.model.draws import StateMode, StateOptions, ViewOptions, ViewPreset
-from artsim.runs.kept import write_kept
 
 
 @dataclass(frozen=True)
-class Evaluate:
+class Evaluate(Figures):
     """Test an estimator on unseen objects, procedural ones or those of files, and print the table of its errors.
 
     The benchmarks are separate commands: artperl artimage, robustness, reartmix, ablation.
@@ -51,8 +50,6 @@ class Evaluate:
     """Depth sensor of the clouds."""
     num_points: int = 8192
     """Points of a cloud: pixels of the object, drawn at random."""
-    json: Path | None = None
-    """Write the figures to this file."""
 
     def run(self) -> None:
         from artperl.data.categories import objects_of
@@ -65,8 +62,6 @@ class Evaluate:
         from artperl.methods.estimator_folders import folder_of, read_settings
         from artsim.loading.sources import find_sources
 
-        if self.json is not None:
-            check_output(self.json)
         told: dict[str, Any] = {} if self.seen_from is None else {"seen_from": self.seen_from}
         estimator = load_estimator(self.estimator, method=self.method, **told)
         stored = self.method in STORED_METHODS
@@ -91,5 +86,5 @@ class Evaluate:
             objects = objects_of(categories, self.objects, TEST_SEEDS, parts)
             samples = frozen_samples(categories, self.objects, self.views, options, parts=parts)
         figures = summary(evaluate(estimator, samples, True, object_symmetries(objects)))
-        print(table(figures))
-        write_kept(self.json, figures, indent=1)
+        self.say(table(figures))
+        self.finish(figures)

@@ -1,5 +1,6 @@
 """The verb ``artperl reartmix``."""
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -7,16 +8,16 @@ from typing import Any
 from artperl.commands.estimators import named_estimators
 from artperl.detection import SHIPPED
 from artsim.common.outputs import check_output
-from artsim.common.program import cores
-from artsim.common.progress import say
+from artsim.common.program import Figures, cores
 from artsim.errors import ConfigError
-from artsim.runs.kept import write_kept
+
+log = logging.getLogger(__name__)
 
 _FOLDER = Path("out/reartmix")
 
 
 @dataclass(frozen=True)
-class ReArtMix:
+class ReArtMix(Figures):
     """Test estimators on images of several objects: average precision at 5 degrees, 5 cm and IoU 0.5."""
 
     root: Path | None = None
@@ -39,8 +40,6 @@ class ReArtMix:
     By default unknown."""
     picture: Path | None = None
     """Write the first 12 images with the estimates over them here, as PNG."""
-    json: Path | None = None
-    """Write the figures to this file."""
 
     def run(self) -> None:
         from artperl.evaluation.reartmix import SEEDS, open_images, reartmix_scenes, run_reartmix
@@ -48,8 +47,8 @@ class ReArtMix:
         from artperl.scene.estimator import SceneEstimator
         from artsim.scenes import generate_scenes
 
-        if self.json is not None:
-            check_output(self.json, [self.detections])
+        if self.json_file is not None:
+            check_output(self.json_file, [self.detections])
         root = self.root
         if root is None:
             root = _FOLDER
@@ -61,9 +60,9 @@ class ReArtMix:
         if self.detections is not None:
             detections = read_detections(self.detections, images.sizes, images.names(), self.skip_bad)
         for text in () if detections is None else detections.skipped:
-            say(f"left out: {text}")
+            log.warning(f"left out: {text}")
         told: dict[str, Any] = {} if self.seen_from is None else {"seen_from": self.seen_from}
         named: dict[str, str | Path] = {"drawer": "generic", **named_estimators(self.estimators)}
         estimator = SceneEstimator(named, self.detector or SHIPPED, **told)
-        figures = run_reartmix(images, detections, estimator, True, say, self.picture)
-        write_kept(self.json, figures, indent=1)
+        figures = run_reartmix(images, detections, estimator, True, self.say, self.picture)
+        self.finish(figures)

@@ -1,17 +1,19 @@
 """The verb ``artperl report``."""
 
+import logging
 import os
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from artperl.methods import StoredMethod
-from artsim.common.progress import say
+from artsim.common.program import Figures, resumable
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Report:
+class Report(Figures):
     """Compare all methods on a benchmark: train or load each, test each on the same views, and write one report.
 
     The report is OUT/report.md; report.json has its figures. Stop it at any moment with Ctrl-C: rerun the command to
@@ -77,9 +79,7 @@ class Report:
         out = self.out or Path("out") / f"report-{self.benchmark}{'-quick' if self.quick else ''}"
         if self.minutes is not None:
             torch.set_num_threads(1)
-        try:
-            run_comparison(options, out, self.workers, True, say)
-        except KeyboardInterrupt:
-            print(f"stopped; rerun the command to resume from {out}", file=sys.stderr)
-            sys.exit(130)
-        print((out / f"report{options.suffix}.md").read_text(), end="")
+        with resumable("finished steps are kept", out):
+            figures = run_comparison(options, out, self.workers, True, log.info)
+        self.say((out / f"report{options.suffix}.md").read_text())
+        self.finish(figures)

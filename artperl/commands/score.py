@@ -1,16 +1,19 @@
 """The verb ``artperl score``."""
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
 
 from artsim.common.outputs import check_output, write_output
-from artsim.runs.kept import write_kept
+from artsim.common.program import Figures
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Score:
+class Score(Figures):
     """Score anybody's estimates against a dataset, such as the test split of ArtSim-10K, and write a page.
 
     A file of estimates is a JSON list, or has a JSON record in each line: what artperl estimate writes of a dataset.
@@ -27,8 +30,6 @@ class Score:
     """Folder of the dataset."""
     out: Path | None = None
     """Write the page, Markdown, to this file; by default it is printed."""
-    json: Path | None = None
-    """Write the figures to this file."""
 
     def run(self) -> None:
         from artperl.evaluation.predictions import page, read_predictions, score_predictions, symmetries_of
@@ -36,7 +37,7 @@ class Score:
         from artsim.datasets.dataset import open_dataset
         from artsim.datasets.frozen import frozen_name
 
-        for path in (self.out, self.json):
+        for path in (self.out, self.json_file):
             if path is not None:
                 check_output(path, self.predictions)
         read = [read_predictions(path) for path in self.predictions]
@@ -50,9 +51,9 @@ class Score:
             "Right: every part within 10 degrees and 5 % of the diagonal. Errors of parts, up to symmetry.",
         ]
         text = page(title, scored, notes)
-        write_kept(self.json, {name: summary(own) for name, own in scored.items()}, indent=1)
         if self.out is None:
-            print(text)
+            self.say(text)
         else:
             write_output(self.out, text.encode(), self.predictions)
-            print(f"{self.out}: {', '.join(scored)} against {title}")
+            log.info(f"{self.out}: {', '.join(scored)} against {title}")
+        self.finish({name: summary(own) for name, own in scored.items()})

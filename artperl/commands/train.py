@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-import sys
+import logging
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -12,7 +12,9 @@ import tyro
 
 from artperl.methods import StoredMethod
 from artperl.methods.estimator_folders import RUNS, WEIGHTS
+from artsim.common.files import read_json
 from artsim.common.names import safe_name
+from artsim.common.program import Figures, resumable
 from artsim.errors import ConfigError
 from artsim.loading.roots import PackageRoots
 from artsim.model.draws import StateMode, ViewPreset
@@ -21,12 +23,14 @@ if TYPE_CHECKING:
     from artperl.training.options import TrainOptions
     from artperl.training.recipes import Recipe
 
+log = logging.getLogger(__name__)
+
 _FILE_VIEWS = 40
 """Views of files, at least, that an estimator is tested with."""
 
 
 @dataclass(frozen=True)
-class Train:
+class Train(Figures):
     """Train an estimator on new procedural objects, or on given objects, and test it as it learns.
 
     Prints the table of errors at intervals and keeps the best estimator in OUT/best. Stop it at any moment with Ctrl-C:
@@ -142,7 +146,7 @@ class Train:
         method = "" if options.method == "full" else f"{options.method}-"
         out = self.out or RUNS / (options.name or f"{name}-{method}{preset}")
         if recipe is None or not is_made(out, recipe):
-            try:
+            with resumable("checkpoints are kept", out):
                 training = Training(options, out, self.workers, recipe=recipe, device=self.device)
                 if self.wandb is not None and training.context.ranks.first:
                     _open_wandb(self.wandb, out, asdict(options))
@@ -150,11 +154,9 @@ class Train:
                 training.context.ranks.close()
                 if not training.context.ranks.first:
                     return
-            except KeyboardInterrupt:
-                print(f"stopped; rerun the command to resume from {out}", file=sys.stderr)
-                sys.exit(130)
-        print((out / "table.txt").read_text(), end="")
-        print(f"estimator: {out / 'best'}")
+        self.say((out / "table.txt").read_text().rstrip("\n"))
+        self.finish(read_json(out / "figures.json", "the figures of the run", ConfigError))
+        log.info(f"estimator: {out / 'best'}")
 
     def _options(self, recipe: Recipe | None) -> TrainOptions:
         """Those of the preset or the recipe, with what is given."""

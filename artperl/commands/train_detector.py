@@ -1,6 +1,6 @@
 """The verb ``artperl train-detector``."""
 
-import sys
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -8,8 +8,10 @@ from typing import Literal
 import tyro
 
 from artsim.common.extras import require_extra
-from artsim.common.program import cores
+from artsim.common.program import cores, resumable
 from artsim.errors import ConfigError
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -62,12 +64,9 @@ class TrainDetector:
 
         if self.threads is not None:
             torch.set_num_threads(self.threads)
-        try:
+        with resumable("checkpoints are kept", self.out):
             folders = self.scenes or make_detector_scenes(self.out / "scenes", self.share, cores())
             names = ("steps", "batch_size", "width", "blocks", "rate", "seed", "device")
             options = scene_options(folders, **{name: getattr(self, name) for name in names})
             detector = train_detector(options, self.out, self.workers)
-        except KeyboardInterrupt:
-            print(f"stopped; rerun the command to resume from {self.out}", file=sys.stderr)
-            sys.exit(130)
-        print(f"{detector}: {self.out / 'best'}")
+        log.info(f"{detector}: {self.out / 'best'}")

@@ -1,4 +1,7 @@
-"""The program ``artperl``: training, estimation, tests, benchmarks and reports."""
+"""Poses of the parts of articulated objects in clouds and images: estimators, their training and their tests.
+
+First steps: artperl estimate cloud.ply --category laptop --view out.html
+"""
 
 import sys
 from itertools import pairwise
@@ -17,30 +20,34 @@ from artperl.commands.report import Report
 from artperl.commands.score import Score
 from artperl.commands.train import Train
 from artperl.commands.train_detector import TrainDetector
+from artsim.common.messages import note
 from artsim.common.program import run_program
-from artsim.common.progress import say
 
-Verb = (
-    Annotated[Demo, tyro.conf.subcommand("demo")]
-    | Annotated[Train, tyro.conf.subcommand("train")]
-    | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
-    | Annotated[ArtImage, tyro.conf.subcommand("artimage")]
-    | Annotated[Robustness, tyro.conf.subcommand("robustness")]
-    | Annotated[ReArtMix, tyro.conf.subcommand("reartmix")]
-    | Annotated[Ablation, tyro.conf.subcommand("ablation")]
-    | Annotated[Estimate, tyro.conf.subcommand("estimate")]
-    | Annotated[Score, tyro.conf.subcommand("score")]
-    | Annotated[Report, tyro.conf.subcommand("report")]
-    | Annotated[Calibrate, tyro.conf.subcommand("calibrate")]
-    | Annotated[MakeDetections, tyro.conf.subcommand("detections")]
-    | Annotated[TrainDetector, tyro.conf.subcommand("train-detector")]
-)
+VERBS = {
+    "Poses": (Annotated[Estimate, tyro.conf.subcommand("estimate")],),
+    "Training": (
+        Annotated[Demo, tyro.conf.subcommand("demo")],
+        Annotated[Train, tyro.conf.subcommand("train")],
+        Annotated[TrainDetector, tyro.conf.subcommand("train-detector")],
+        Annotated[Calibrate, tyro.conf.subcommand("calibrate")],
+    ),
+    "Tests": (
+        Annotated[Evaluate, tyro.conf.subcommand("evaluate")],
+        Annotated[Score, tyro.conf.subcommand("score")],
+        Annotated[Report, tyro.conf.subcommand("report")],
+        Annotated[ArtImage, tyro.conf.subcommand("artimage")],
+        Annotated[ReArtMix, tyro.conf.subcommand("reartmix")],
+        Annotated[Robustness, tyro.conf.subcommand("robustness")],
+        Annotated[Ablation, tyro.conf.subcommand("ablation")],
+        Annotated[MakeDetections, tyro.conf.subcommand("detections")],
+    ),
+}
 
 
 def main() -> None:
     """Entry point of ``artperl``."""
     sys.argv[1:] = with_new_names(sys.argv[1:])
-    run_program(Verb, "artperl", __doc__)
+    run_program(VERBS, "artperl", __doc__)
 
 
 def with_new_names(words: list[str]) -> list[str]:
@@ -48,7 +55,7 @@ def with_new_names(words: list[str]) -> list[str]:
     preset full is long.
     """
     if ("--preset", "full") in pairwise(words):
-        say("note: the preset full is now long")
+        note("the preset full is now long")
         words[words.index("--preset") + 1] = "long"
     if words[:1] != ["evaluate"]:
         return words
@@ -62,10 +69,10 @@ def with_new_names(words: list[str]) -> list[str]:
         del rest[at : at + 2]
     else:
         return words
-    say(f"note: artperl evaluate {'--ablation' if name == 'ablation' else f'--benchmark {name}'} is now artperl {name}")
+    note(f"artperl evaluate {'--ablation' if name == 'ablation' else f'--benchmark {name}'} is now artperl {name}")
     return [name, *rest]
 
 
 def train_main() -> None:
     """Entry point of ``train.py``."""
-    run_program(Train, "train.py")
+    run_program({"": (Train,)}, "train.py")

@@ -96,8 +96,8 @@ def _truth(scenes: SceneDataset, numbers: Mapping[str, int]) -> Iterator[dict[st
             yield {**own, **mask_record(mask), "iscrowd": ignored, "ignore": ignored}
 
 
-def precision_lines(scenes: SceneDataset, found: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """The table of :func:`mask_precision` for people."""
+def precision_lines(precision: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
+    """The table of what :func:`mask_precision` gives, for people."""
     yield f"{'masks, %':<14}" + "".join(f"{title:>8}" for title in _THRESHOLDS) + f"{'objects':>9}"
-    for name, own in mask_precision(scenes, found).items():
+    for name, own in precision.items():
         yield f"{name:<14}" + "".join(f"{100 * own[title]:>8.1f}" for title in _THRESHOLDS) + f"{own['objects']:>9.0f}"

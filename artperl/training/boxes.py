@@ -1,5 +1,6 @@
 """Stage: the network for boxes learns from the best estimator's own estimates."""
 
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -20,8 +21,9 @@ from artperl.training.box_records import learn, record
 from artperl.training.context import Context
 from artperl.training.report import scalars
 from artperl.training.validation import given_samples, unseen_samples
-from artsim.common.progress import say
 from artsim.observing.sample import Sample
+
+log = logging.getLogger(__name__)
 
 _VIEWS = 2
 """Views in a row of the same object."""
@@ -65,7 +67,7 @@ class BoxStage:
         context.stop_if_asked()
         state.done[self.name] = options.box_views
         if learnt is None:
-            say("boxes: no estimate fits its view; they stay as they are")
+            log.info("boxes: no estimate fits its view; they stay as they are")
         else:
             with context.counted("validation"):
                 _choose(context, best, learner, learnt.half().float())  # as precise as files are
@@ -122,4 +124,4 @@ def _choose(context: Context, best: Estimator, learner: Estimator, boxes: Boxes)
         save_estimator(replace(best, boxes=boxes), context.folder.best, context.about({"validation": figures}))
     context.report("validation", scalars(figures), context.state.step)
     if context.progress:
-        say(f"boxes: mean IoU {100 * mean_iou(before):.1f} -> {100 * mean_iou(after):.1f} %")
+        log.info(f"boxes: mean IoU {100 * mean_iou(before):.1f} -> {100 * mean_iou(after):.1f} %")

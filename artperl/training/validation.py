@@ -1,6 +1,7 @@
 """Validation of a run on a frozen set of unseen objects, its calibration, and its test."""
 
 import json
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
@@ -25,11 +26,12 @@ from artperl.methods.protocol import Method
 from artperl.training.context import Context
 from artperl.training.report import rounded, scalars, write_report
 from artsim.common.files import write_atomic
-from artsim.common.progress import say
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ArtsimError
 from artsim.model.objects import ArticulatedObject
 from artsim.observing.sample import Sample
+
+log = logging.getLogger(__name__)
 
 _AS_GOOD = 1.01
 """Of two estimators whose scores differ by less than this factor, the one that learnt longer is kept."""
@@ -136,7 +138,7 @@ def _validate(context: Context, stage: str) -> None:
         save_estimator(estimator, context.folder.best, context.about({"validation": figures}))
     context.save()
     if context.progress:
-        say(f"after {dict(state.done)}: score {score:.2f}\n{table(figures)}")
+        log.info(f"after {dict(state.done)}: score {score:.2f}\n{table(figures)}")
 
 
 def _of_degraded(estimator: Method, samples: Sequence[Sample], context: Context) -> list[Scored]:
@@ -169,7 +171,7 @@ def test(context: Context) -> dict[str, Any]:
     try:
         write_report(out, best, samples, scored, table(figures))
     except ArtsimError as error:  # without matplotlib there are no pictures
-        say(f"no report: {error}")
+        log.warning(f"no report: {error}")
     return figures
 
 

@@ -1,18 +1,22 @@
 """The verb ``artsim convert``."""
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import tyro
 
 from artsim.commands.having import Workers
-from artsim.commands.printing import print_made, resumable
+from artsim.commands.printing import log_made
+from artsim.common.program import Figures, resumable
 from artsim.formats.base import FormatName
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Convert(Workers):
+class Convert(Figures, Workers):
     """Convert a finished dataset to a format that other programs read.
 
     webdataset: tar shards with plain keys. huggingface: Parquet with a card. ply: one coloured cloud for each sample.
@@ -39,18 +43,19 @@ class Convert(Workers):
 
     def run(self) -> None:
         if self.to == "lerobot":
-            _write_motions(self.path, self.out)
+            self.finish(_write_motions(self.path, self.out))
             return
         from artsim.formats.conversion import convert
 
         with resumable("whole files are kept", self.out):
             result = convert(self.path, self.to, self.out, self.split, self.samples, self.group, self.workers)
         whole = f"{result.num_samples} {result.unit}s in {result.files} files"
-        print_made(result.folder, whole, result.made, f"{result.unit}s", result.seconds)
+        log_made(result.folder, whole, result.made, f"{result.unit}s", result.seconds)
+        self.finish(result)
 
 
-def _write_motions(folder: Path, out: Path) -> None:
-    """Write the motions in a folder as a LeRobot dataset, and say what was written."""
+def _write_motions(folder: Path, out: Path) -> dict[str, Any]:
+    """Write the motions in a folder as a LeRobot dataset: what was written."""
     import numpy as np
 
     from artsim.common.progress import track
@@ -68,4 +73,5 @@ def _write_motions(folder: Path, out: Path) -> None:
     joints, points = max(len(motion.obj) - 1 for motion in motions), len(motions[0][0].points)
     write_lerobot(out, recordings, 1.0 / (motions[0].time[1] - motions[0].time[0]), joints, points)
     frames = sum(map(len, motions))
-    print(f"{out}: {len(motions)} episodes of {frames} frames; open it with lerobot's LeRobotDataset")
+    log.info(f"{out}: {len(motions)} episodes of {frames} frames; open it with lerobot's LeRobotDataset")
+    return {"folder": out, "episodes": len(motions), "frames": frames}

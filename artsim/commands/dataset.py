@@ -7,11 +7,12 @@ from typing import Literal
 import tyro
 
 from artsim.commands.having import Workers
-from artsim.commands.printing import print_made, resumable
+from artsim.commands.printing import log_made
+from artsim.common.program import Figures, resumable
 
 
 @dataclass(frozen=True)
-class Dataset(Workers):
+class Dataset(Figures, Workers):
     """Make a frozen dataset: the same bytes as everybody has.
 
     artsim-10k: 10,200 procedural objects of 51 categories, a view of each, in the splits train, val and test, each a
@@ -34,5 +35,6 @@ class Dataset(Workers):
         manifest = read_manifest(self.name)
         with resumable("whole files are kept", self.out):
             result = make_frozen(manifest, self.out, self.splits, self.workers)
-        print_made(result.folder, f"{result.total} samples, equal to {manifest.name}", result.made, "samples",
-                   result.seconds)  # fmt: skip
+        log_made(result.folder, f"{result.total} samples, equal to {manifest.name}", result.made, "samples",
+                 result.seconds)  # fmt: skip
+        self.finish(result)

@@ -16,6 +16,8 @@ from functools import partial
 import tyro
 
 from artsim.common.extras import import_failure, install_command
+from artsim.common.program import Figures
+from artsim.common.progress import track
 from artsim.errors import ArtsimError, ConfigError, RenderError
 from artsim.renderers import RENDERERS
 from artsim.renderers.ray_scenes import RAY_LIBRARY
@@ -215,14 +217,16 @@ def _answer(backend: str) -> Finding:
 
 
 @dataclass(frozen=True)
-class Doctor:
+class Doctor(Figures):
     """Try every backend: does it work, on which device, how fast, and what to do if not."""
 
     backends: tyro.conf.Positional[tuple[str, ...]] = ()
     """raycast, pybullet, pybullet-egl, sapien, warp, maniskill, ray, torch; by default all of them."""
 
     def run(self) -> None:
-        print(finding_table([examine(backend) for backend in self.backends or BACKENDS]))
+        findings = [examine(backend) for backend in track("backends", self.backends or tuple(BACKENDS), leave=False)]
+        self.say(finding_table(findings))
+        self.finish(findings)
 
 
 if __name__ == "__main__":

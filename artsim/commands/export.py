@@ -8,13 +8,14 @@ from typing import Annotated, Literal
 
 import tyro
 
+from artsim.common.program import Figures
 from artsim.errors import ConfigError
 from artsim.export.options import ExportOptions
 from artsim.loading.roots import Opened
 
 
 @dataclass(frozen=True)
-class Export(Opened):
+class Export(Figures, Opened):
     """Write an object as URDF, MJCF and USD for simulators, such as one of PartNet-Mobility.
 
     What collides is cut into convex pieces, so that things can be put into drawers. That takes seconds for each hollow
@@ -50,7 +51,8 @@ class Export(Opened):
             export(obj, made, self.formats, {"source": {"collision": self.collision}}, self.options)
             shutil.move(made, self.out)
         pieces = sum(len(part.body.pieces) for part in obj.parts if part.body is not None)
-        print(f"{self.out}: {', '.join(self.formats)}; {len(obj)} parts, {pieces} shapes that collide")
-        for repair in obj.repairs:
-            if not repair.note:
-                print(f"  {repair}")
+        self.say(f"{self.out}: {', '.join(self.formats)}; {len(obj)} parts, {pieces} shapes that collide")
+        repairs = [repair for repair in obj.repairs if not repair.note]
+        for repair in repairs:
+            self.say(f"  {repair}")
+        self.finish({"folder": self.out, "parts": len(obj), "pieces": pieces, "repairs": repairs})

@@ -1,5 +1,6 @@
 """The verb ``artsim generate``, and ``generate.py``."""
 
+import logging
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -8,16 +9,19 @@ import tyro
 
 from artsim.commands.convert import Convert
 from artsim.commands.having import Having, Workers, categories_named
-from artsim.commands.printing import print_made, resumable
+from artsim.commands.printing import log_made
+from artsim.common.program import Figures, resumable
 from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError
 from artsim.families.constraints import Constraints
 from artsim.formats.base import FormatName
 from artsim.loading.roots import Opened
 
+log = logging.getLogger(__name__)
+
 
 @dataclass(frozen=True)
-class Generate(Opened, Workers):
+class Generate(Figures, Opened, Workers):
     """Generate a dataset of labelled partial point clouds.
 
     Poses each object in random joint states, looks at it from random viewpoints, and writes clouds with full ground
@@ -65,7 +69,6 @@ class Generate(Opened, Workers):
     """Also convert the finished dataset to this format, into the folder <out>_<format>; see artsim convert."""
 
     def run(self) -> None:
-        from artsim.common.names import printable
         from artsim.datasets.generate import generate
         from artsim.datasets.preparing import Share
         from artsim.datasets.summary import object_lines
@@ -87,21 +90,24 @@ class Generate(Opened, Workers):
                 sources, self.out, self.num_samples, self.seed, self.sample, self.workers, self.shard_size, self.splits,
                 self.skip_broken, strict=self.strict, load_limit=self.load_limit, ray=self.ray, share=share,
             )  # fmt: skip
+        figures = vars(result) | {"objects": len(result.objects)}
         for reason in result.left_out:
-            print(f"left out: {printable(reason, 1000)}")
+            log.warning("left out: %s", reason)
         if share is not None:
-            print(f"{result.folder}: share {share} is done, {result.made} samples made now")
-            print(f"when all are: artsim merge {result.folder}")
+            log.info(f"{result.folder}: share {share} is done, {result.made} samples made now")
+            log.info(f"when all are: artsim merge {result.folder}")
+            self.finish(figures)
             return
         for line in object_lines(str(result.folder), result.objects):
-            print(line)
+            self.say(line)
         if result.grown_from is not None:
             kept = result.num_samples - result.made
-            print(f"extended from {result.grown_from} samples, {kept} of which are kept in their shards")
+            log.info(f"extended from {result.grown_from} samples, {kept} of which are kept in their shards")
         for file in result.restored:
-            print(f"regenerated: {file}")
-        print_made(result.folder, f"{result.num_samples} samples", result.made, "samples", result.seconds)
+            log.info(f"regenerated: {file}")
+        log_made(result.folder, f"{result.num_samples} samples", result.made, "samples", result.seconds)
         if result.made:
-            print(f"look at them: artsim view {result.folder}")
+            log.info(f"look at them: artsim view {result.folder}")
         if self.format is not None:
             Convert(Path(self.out), self.format, Path(f"{self.out}_{self.format}"), workers=self.workers).run()
+        self.finish(figures)

@@ -7,13 +7,14 @@ from typing import Annotated, Literal
 import tyro
 
 from artsim.commands.having import Having, Workers, categories_named
-from artsim.commands.printing import print_made, resumable
+from artsim.commands.printing import log_made
+from artsim.common.program import Figures, resumable
 from artsim.export.options import ExportOptions
 from artsim.families.constraints import Constraints
 
 
 @dataclass(frozen=True)
-class GenerateObjects(Workers):
+class GenerateObjects(Figures, Workers):
     """Write procedural objects as files: simulation-ready URDF folders in PartNet-Mobility's style, MJCF, USD.
 
     Every object has a folder <out>/<category>/<seed>, and index.csv lists them all. Stop it at any moment: rerun
@@ -44,4 +45,5 @@ class GenerateObjects(Workers):
                 categories_named(self.category), self.out, self.count, self.seed, self.formats, self.workers,
                 constraints=Constraints.parse(self.having), options=self.options,
             )  # fmt: skip
-        print_made(result.folder, f"{result.total} objects", result.made, "objects", result.seconds)
+        log_made(result.folder, f"{result.total} objects", result.made, "objects", result.seconds)
+        self.finish(result)

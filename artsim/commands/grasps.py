@@ -1,19 +1,21 @@
 """The command ``artsim grasps``."""
 
-import json
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
 
 from artsim.commands.having import Workers, categories_named
-from artsim.common.progress import say
+from artsim.common.program import Figures
 from artsim.errors import AssetError, ConfigError
 from artsim.loading.roots import Packages
 
+log = logging.getLogger(__name__)
+
 
 @dataclass(frozen=True)
-class Grasps(Packages, Workers):
+class Grasps(Figures, Packages, Workers):
     """Find grasps of movable parts that open their joints, each proved in MuJoCo by a hand with two fingers.
 
     For every part there are up to 16 places where the fingers close on opposite sides of a handle or an edge. The hand
@@ -36,8 +38,6 @@ class Grasps(Packages, Workers):
     """Seed of the first object of a category, and of the draws."""
     per_part: int = 16
     """Grasps of a part, at most."""
-    json: bool = False
-    """Print the figures as JSON, too, on the last line."""
 
     def run(self) -> None:
         from artsim.loading.sources import Source, family_sources, find_sources
@@ -51,12 +51,11 @@ class Grasps(Packages, Workers):
             sources += family_sources(categories, self.count, self.seed)
         done = write_grasps(sources, self.out, self.per_part, self.seed, self.workers)
         for line in done.failed:
-            say(f"left out: {line}")
-        print(
+            log.warning("left out: %s", line)
+        self.say(
             f"{self.out}: {done.grasps} grasps of {done.grasped} parts; {done.graspable} of {done.parts} movable parts "
             f"of {done.objects} objects have room for the hand ({done.objects - done.made} objects were there already)"
         )
-        if self.json:
-            print(json.dumps(vars(done)))
+        self.finish(done)
         if len(done.failed) == done.objects:
             raise AssetError("no object has grasps", str(self.out), "see the lines above")

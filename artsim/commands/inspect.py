@@ -1,16 +1,19 @@
 """The verbs ``artsim inspect`` and ``artsim families``: an object, or a category, in words."""
 
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import tyro
 
 from artsim.commands.having import categories_named
+from artsim.common.program import Figures
 from artsim.loading.roots import Opened
 
 
 @dataclass(frozen=True)
-class Inspect(Opened):
+class Inspect(Figures, Opened):
     """Print an object's tree, joints, limits, boxes, and repairs of the loader."""
 
     path: tyro.conf.Positional[Path]
@@ -19,21 +22,23 @@ class Inspect(Opened):
     """Also pass the object through the sim-readiness gates, and list what each finds."""
 
     def run(self) -> None:
-        from artsim.drawing.inspect import describe
+        from artsim.drawing.inspect import describe, described
         from artsim.loading.urdf import load
 
         obj = load(self.path, package_roots=self.package_root, body=self.body)
-        print(describe(obj))
+        figures = described(obj)
+        self.say(describe(obj))
         if self.gates:
             from artsim.checks.validity import check_file
 
-            print("\ngates")
-            for gate in check_file(obj, self.path, self.package_root):
-                print(f"  {gate}")
+            gates = check_file(obj, self.path, self.package_root)
+            self.say("\n".join(["\ngates", *(f"  {gate}" for gate in gates)]))
+            figures["gates"] = gates
+        self.finish(figures)
 
 
 @dataclass(frozen=True)
-class Families:
+class Families(Figures):
     """Print what each procedural category is: parameters, joint types, numbers of parts, handles and legs.
 
     Numbers and kinds are those seen over the first seeds. Any of them may be asked for with --having.
@@ -49,5 +54,26 @@ class Families:
     def run(self) -> None:
         from artsim.families.catalogue import describe_family
 
-        for name in categories_named(self.names or ("all",)):
-            print(describe_family(name, self.objects))
+        names = categories_named(self.names or ("all",))
+        for name in names:
+            self.say(describe_family(name, self.objects))
+        self.finish({name: _figures(name, self.objects) for name in names} if self.json else None)
+
+
+def _figures(category: str, count: int) -> dict[str, Any]:
+    """Ranges of numbers of parts and of metres, objects with each joint type and feature, and what draws may give."""
+    from artsim.families.catalogue import seen_of
+    from artsim.families.constraints import FEATURES, LENGTHS, described, measured, measured_length
+    from artsim.making.draws import ranges
+
+    traces, made = seen_of(category, count)
+    numbers = {"parts": [len(own) for own in made]} | {
+        name: [measured_length(own, name) for own in made] for name in LENGTHS
+    }
+    return {
+        "objects": count,
+        **{name: (min(values), max(values)) for name, values in numbers.items()},
+        "joint_types": Counter(kind for own in made for kind in set(own.joint_types[1:])),
+        **{name: sum(bool(measured(own, name)) for own in made) for name in FEATURES},
+        "parameters": {name: described(draw) for name, draw in ranges(trace.drawn for trace in traces).items()},
+    }

@@ -1,5 +1,6 @@
 """The verb ``artsim record``."""
 
+import logging
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated
@@ -7,11 +8,14 @@ from typing import Annotated
 import tyro
 
 from artsim.commands.having import categories_named
+from artsim.common.program import Figures
 from artsim.physics.episode import EpisodeOptions
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Record:
+class Record(Figures):
     """Record motions for tracking: objects under physics, frame by frame, with full ground truth.
 
     Every motion is a shard of samples of one object, a control step apart, whose joints a motor drives from one random
@@ -35,4 +39,5 @@ class Record:
 
         episode = replace(self.episode, categories=categories_named(self.episode.categories))
         folder = record(self.out, episode, self.motions, self.frames, self.seed)
-        print(f"{folder}: {self.motions} motions of {self.frames} frames; read them with artsim.physics.open_motions")
+        log.info(f"{folder}: {self.motions} motions of {self.frames} frames; read them: artsim.physics.open_motions")
+        self.finish({"folder": folder, "motions": self.motions, "frames": self.frames})

@@ -7,7 +7,8 @@ from typing import Annotated
 import tyro
 
 from artsim.commands.having import Workers
-from artsim.commands.printing import print_some, resumable
+from artsim.commands.printing import say_some
+from artsim.common.program import Figures, resumable
 from artsim.common.tables import plural
 from artsim.errors import DatasetError
 from artsim.loading.roots import Packages
@@ -15,7 +16,7 @@ from artsim.runs.recipe import check_counts
 
 
 @dataclass(frozen=True)
-class Verify(Workers):
+class Verify(Figures, Workers):
     """Check a dataset: every checksum, the descriptions, the objects, and the ground truth of every sample.
 
     Nothing is written. Each problem says what to do.
@@ -30,14 +31,15 @@ class Verify(Workers):
 
         check_counts(workers=self.workers)
         problems = verify(self.path, workers=self.workers)
-        print_some(problems)
+        say_some(problems, self.say)
+        self.finish({"problems": problems})
         if problems:
             raise DatasetError(f"{plural(len(problems), 'problem')} found", self.path, repair_command(self.path))
-        print(f"{self.path}: sound")
+        self.say(f"{self.path}: sound")
 
 
 @dataclass(frozen=True)
-class Repair(Packages, Workers):
+class Repair(Figures, Packages, Workers):
     """Restore what is damaged or missing of a dataset, to the same bytes, or say why that cannot be.
 
     Shards and objects are regenerated, plan.json and dataset.json restore each other. A dataset
@@ -55,15 +57,17 @@ class Repair(Packages, Workers):
 
         with resumable("what was restored stays", self.path):
             result = repair(self.path, find_sources(self.objects, self.package_root), self.workers)
-        print_some([f"restored: {file}" for file in result.restored])
-        print_some(result.failed)
+        say_some([f"restored: {file}" for file in result.restored], self.say)
+        say_some(result.failed, self.say)
+        self.finish(result)
         if result.failed:
             raise DatasetError(f"{len(result.failed)} problems are left", self.path)
-        print(f"{self.path}: " + (f"{len(result.restored)} files restored" if result.restored else "nothing to repair"))
+        done = f"{len(result.restored)} files restored" if result.restored else "nothing to repair"
+        self.say(f"{self.path}: {done}")
 
 
 @dataclass(frozen=True)
-class Merge:
+class Merge(Figures):
     """Complete a dataset that several machines made with artsim generate --share.
 
     Nothing is complete before: shards that are missing are named, with the shares to run again.
@@ -81,6 +85,7 @@ class Merge:
 
         result = merge(self.path, self.check)
         if result.already:
-            print(f"{result.place}: already complete, {result.num_samples} samples")
+            self.say(f"{result.place}: already complete, {result.num_samples} samples")
         else:
-            print(f"{result.place}: {result.num_samples} samples in {result.num_shards} shards, complete")
+            self.say(f"{result.place}: {result.num_samples} samples in {result.num_shards} shards, complete")
+        self.finish(result)

@@ -1,5 +1,6 @@
 """The verb ``artsim scene``."""
 
+import logging
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
@@ -8,17 +9,20 @@ from typing import Annotated, Literal
 import tyro
 
 from artsim.commands.having import Workers
-from artsim.commands.printing import print_made, resumable
-from artsim.common.progress import say, track
+from artsim.commands.printing import log_made
+from artsim.common.program import Figures, resumable
+from artsim.common.progress import track
 from artsim.scenes.dataset import open_scenes
 from artsim.scenes.generate import SceneRun, generate_scenes
+
+log = logging.getLogger(__name__)
 
 _LISTED = 12
 """Views that are printed one by one; the others are counted."""
 
 
 @dataclass(frozen=True)
-class Scene(Workers):
+class Scene(Figures, Workers):
     """Make scenes: several articulated objects on a table or a floor, in colour, with the ground truth of each.
 
     Every view becomes a folder: rgb.png, depth.npy, instance_ids.png, part_ids.png, scene.json, a cloud with its full
@@ -72,12 +76,13 @@ class Scene(Workers):
             converted = [convert_scenes(self.options, self.out, name, self.workers) for name in self.formats]
         for entry in open_scenes(self.out).entries[:_LISTED]:
             seen = ", ".join(f"{obj.category} {100 * obj.visible_fraction:.0f}%" for obj in entry.objects)
-            print(f"{entry.key}: {seen} visible")
-        print_made(result.folder, f"{result.total} scenes", result.made, "scenes", result.seconds)
+            self.say(f"{entry.key}: {seen} visible")
+        log_made(result.folder, f"{result.total} scenes", result.made, "scenes", result.seconds)
         for folder in converted:
-            print(f"wrote {folder}")
+            log.info(f"wrote {folder}")
         if self.simulate:
             self._simulations()
+        self.finish(result)
 
     def _simulations(self) -> None:
         from artsim.scenes.random_scene import make_scene
@@ -89,6 +94,6 @@ class Scene(Workers):
             scene = make_scene(self.options.scene, seed)
             written = write_simulation(scene.instances, out / f"{seed:06d}", self.base, {**recipe, "seed": seed})
             if written.blocked:
-                say(f"{written.folder}: {len(written.blocked)} joints would meet another object somewhere: "
-                    f"{', '.join(written.blocked[:6])}")  # fmt: skip
-        print(f"wrote {out}")
+                log.warning(f"{written.folder}: {len(written.blocked)} joints would meet another object somewhere: "
+                            f"{', '.join(written.blocked[:6])}")  # fmt: skip
+        log.info(f"wrote {out}")

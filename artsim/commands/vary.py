@@ -6,13 +6,14 @@ from typing import Literal
 
 import tyro
 
-from artsim.commands.printing import print_some, resumable
+from artsim.commands.printing import say_some
+from artsim.common.program import Figures, resumable
 from artsim.errors import AssetError
 from artsim.loading.roots import Packages
 
 
 @dataclass(frozen=True)
-class Vary(Packages):
+class Vary(Figures, Packages):
     """Write variations of an object: stretched, other limits and axes, parts exchanged or left out.
 
     Every variation passes the gates that the object passes, and has a folder <out>/<seed> with a URDF file, meshes, and
@@ -48,7 +49,8 @@ class Vary(Packages):
                 self.path, self.out, self.count, self.seed, self.others, self.formats, self.package_root,
                 strength=self.strength, towards=self.towards,
             )  # fmt: skip
-        print_some(summary.failed)
-        print(f"{summary.folder}: {len(summary.notes)} variations of {self.path}\n{summary}")
+        say_some(summary.failed, self.say)
+        self.say(f"{summary.folder}: {len(summary.notes)} variations of {self.path}\n{summary}")
+        self.finish(summary)
         if not summary.notes:
             raise AssetError("no variation passes the gates that the object passes", self.path, "use another --seed")

@@ -1,4 +1,7 @@
-"""The program ``artsim``: datasets, objects, grasps, variations, motions, scenes; checks, pictures, formats."""
+"""Articulated objects, labelled clouds and scenes of them, and everything that checks, shows and converts them.
+
+First steps: artsim generate --categories laptop --num-samples 20 --out out/first; artsim view out/first
+"""
 
 from artsim.commands.convert import Convert
 from artsim.commands.dataset import Dataset
@@ -15,17 +18,20 @@ from artsim.commands.vary import Vary
 from artsim.commands.view import Gallery, View
 from artsim.common.program import run_program
 
-Verb = (
-    Generate | Dataset | Gallery | Families | GenerateObjects | Export | Grasps | Vary | Record | Scene | View | Inspect
-    | Verify | Repair | Merge | Convert | Doctor
-)  # fmt: skip
+VERBS = {
+    "Datasets": (Generate, Dataset, Verify, Repair, Merge, Convert),
+    "Objects": (GenerateObjects, Families, Inspect, Export, Vary, Grasps),
+    "Scenes and motions": (Scene, Record),
+    "Pictures": (View, Gallery),
+    "This machine": (Doctor,),
+}
 
 
 def main() -> None:
     """Entry point of the program ``artsim``."""
-    run_program(Verb, "artsim", __doc__)
+    run_program(VERBS, "artsim", __doc__)
 
 
 def generate_main() -> None:
     """Entry point of ``generate.py``."""
-    run_program(Generate, "generate.py")
+    run_program({"": (Generate,)}, "generate.py")

@@ -1,5 +1,6 @@
 """The verbs ``artsim view`` and ``artsim gallery``: pictures."""
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,6 +10,8 @@ from artsim.commands.having import Having, categories_named
 from artsim.errors import ConfigError
 from artsim.families.constraints import Constraints
 from artsim.loading.roots import Opened
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -56,13 +59,13 @@ class View(Opened):
 
         if self.html is not None:
             write_page(self.path, self.html, self.samples, self.split, self.package_root, self.body)
-            print(f"wrote {self.html}")
+            log.info(f"wrote {self.html}")
             if self.out is None and self.rerun is None:
                 return
         for written in write_contact_sheet(
             self.path, self.out, self.samples, self.split, self.rerun, self.package_root, self.body
         ):
-            print(f"wrote {written}")
+            log.info(f"wrote {written}")
 
 
 @dataclass(frozen=True)
@@ -90,4 +93,4 @@ class Gallery:
             categories_named(self.categories), self.objects, self.first_object, Constraints.parse(self.having)
         )
         write_output(self.out, draw_gallery([source.load() for source in sources], self.states))
-        print(f"wrote {self.out}")
+        log.info(f"wrote {self.out}")

@@ -8,11 +8,12 @@ called, not of others.
 """
 
 import functools
-import sys
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
 from typing_extensions import ParamSpec
+
+from artsim.common.messages import note
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -32,7 +33,7 @@ def _say_compiling() -> None:
 
         def on_start(self, event: Any) -> None:
             if not self.said:
-                print("artsim compiles its loops for this processor: some seconds, once", file=sys.stderr)
+                note("artsim compiles its loops for this processor: some seconds, once")
             self.said = True
 
         def on_end(self, event: Any) -> None: ...

@@ -10,6 +10,8 @@ from typing import Any, TypeAlias
 
 from tqdm import tqdm
 
+from artsim.common.messages import messages_shown, note
+
 EVERY = 60.0
 """Seconds between two lines of a log."""
 
@@ -55,7 +57,7 @@ class Lines:
         self._last, self._said = monotonic(), True
         elapsed = self._last - self._start
         line = tqdm.format_meter(n=self.n, elapsed=elapsed, postfix=self._postfix or None, **self._shape)
-        print(line.strip(), file=sys.stderr, flush=True)
+        note(line.strip())
 
 
 Progress: TypeAlias = "tqdm[Any] | Lines"
@@ -65,7 +67,7 @@ def track(
     description: str, items: Iterable[Any] | None = None, *, total: int | None = None, initial: int = 0,
     unit: str = "it", smoothing: float = 0.3, leave: bool = True, shown: bool = True,
 ) -> Progress:  # fmt: skip
-    """A bar on a terminal and in a notebook, lines elsewhere.
+    """A bar on a terminal and in a notebook, lines elsewhere and in JSON; nothing with ``--quiet``.
 
     Parameters
     ----------
@@ -84,7 +86,9 @@ def track(
     shown : bool
         False says nothing anywhere.
     """
-    if shown and not (sys.stderr.isatty() or "ipykernel" in sys.modules):
+    messages = messages_shown()
+    shown = shown and not (messages and messages.quiet)
+    if shown and ((messages and messages.log_json) or not (sys.stderr.isatty() or "ipykernel" in sys.modules)):
         if total is None and isinstance(items, Sized):
             total = len(items)
         return Lines(description, items, total, initial, unit)
@@ -94,6 +98,6 @@ def track(
 
 
 def say(text: str) -> None:
-    """Print something at once, above the bars that there are."""
+    """Print a result at once, above the bars that there are."""
     tqdm.write(text)
     sys.stdout.flush()

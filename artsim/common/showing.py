@@ -4,7 +4,6 @@ What does it stands in rooms above, whose modules register it.
 """
 
 import html
-import sys
 from collections.abc import Sequence
 from functools import singledispatch
 from importlib import import_module
@@ -88,6 +87,7 @@ class Showable:
         import tempfile  # here, since every "import artsim" imports this module
         import webbrowser
 
+        from artsim.common.messages import note
         from artsim.common.outputs import write_output
 
         page = self._page(**more).encode()
@@ -97,7 +97,7 @@ class Showable:
         with tempfile.NamedTemporaryFile(prefix="artsim-", suffix=".html", delete=False) as file:
             file.write(page)
         if not webbrowser.open(Path(file.name).as_uri()):
-            print(f"no browser is found: open {file.name}", file=sys.stderr)
+            note(f"no browser is found: open {file.name}")
         return Path(file.name)
 
     def _repr_html_(self) -> str:

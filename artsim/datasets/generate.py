@@ -16,6 +16,7 @@ none of it. Until the dataset is merged, its folder ``parts`` holds::
 """
 
 import json
+import logging
 import re
 import time
 from collections.abc import Sequence
@@ -24,7 +25,6 @@ from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
-from artsim.common.progress import say
 from artsim.datasets.description import DESCRIPTION, PLAN, StartedDataset, document_bytes, read_started
 from artsim.datasets.inventory import (
     UNFINISHED,
@@ -50,6 +50,8 @@ from artsim.runs.pool import WorkerPool
 from artsim.runs.ray_pool import RayPool
 from artsim.runs.recipe import check_counts, check_seed, differences
 from artsim.runs.storage import FolderStorage, Storage, is_url, storage_of
+
+log = logging.getLogger(__name__)
 
 LOAD_LIMIT = 300.0
 """Seconds that an object may take to load: a hundred times what the largest real ones take."""
@@ -172,7 +174,7 @@ def generate(
                 own = shards if begun.complete else shards[machine.number :: machine.count]
                 inventory = examine_sizes(storage, begun, own, PARTS)
             if progress and inventory.shards:
-                say(expected_line(begun.plan))
+                log.info(expected_line(begun.plan))
             parts = PARTS_OF_ONE if alone else PARTS
             restored = Restoration(storage, begun, inventory, sources, team, progress, parts, share is None)
             restored.run()

@@ -1,9 +1,11 @@
 """A readable description of an object: its tree, joints, limits, boxes and repairs."""
 
+from typing import Any
+
 import numpy as np
 
 from artsim.common.names import printable
-from artsim.model.joints import Joint
+from artsim.model.joints import Joint, joint_record
 from artsim.model.objects import ArticulatedObject
 
 
@@ -31,6 +33,19 @@ def describe(obj: ArticulatedObject) -> str:
         lines += ["", "no joint can move: the object is rigid"]
     lines += ["", f"repairs: {len(obj.repairs) or 'none'}", *(f"  {repair}" for repair in obj.repairs)]
     return "\n".join(lines)
+
+
+def described(obj: ArticulatedObject) -> dict[str, Any]:
+    """The same in JSON's terms: metres and radians, limits that are none as null."""
+    parts = [
+        {"name": part.name, "label": part.label, "joint": joint_record(joint), "box_center": center, "box_size": size}
+        for part, joint, center, size in zip(obj.parts, obj.tree.joints, obj.box_center, obj.box_size, strict=True)
+    ]
+    return {
+        "category": obj.category, "object_id": obj.object_id, "source": obj.source, "sha256": obj.sha256,
+        "triangles": obj.num_faces, "free_joints": len(obj.tree.free_joints), "diagonal": obj.diagonal,
+        "bounds": obj.bounds, "parts": parts, "repairs": obj.repairs,
+    }  # fmt: skip
 
 
 def _lengths(vector: np.ndarray) -> str:

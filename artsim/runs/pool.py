@@ -18,6 +18,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeAlias, TypeVar
 
+from artsim.common.messages import messages_shown
 from artsim.errors import DatasetError
 from artsim.runs.worker import serve
 
@@ -168,7 +169,7 @@ class WorkerPool:
     def _start(self) -> _Member:
         """A new process; it never hears a Ctrl-C, which is the parent's to answer."""
         ours, theirs = self._spawn.Pipe()
-        process = self._spawn.Process(target=serve, args=(theirs, self._context))
+        process = self._spawn.Process(target=serve, args=(theirs, self._context, messages_shown()))
         if sys.platform == "win32":
             process.start()
         else:

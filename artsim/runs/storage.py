@@ -4,12 +4,15 @@ Names in a storage are relative and have ``/`` between their parts. A file is ab
 locks, no links and cannot append: nothing here asks for them.
 """
 
+import functools
 import io
+import logging
 import os
 import random
 import re
 import secrets
 import shutil
+import threading
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -19,16 +22,26 @@ from artsim.common.extras import install_command, require_extra
 from artsim.common.files import read_bounded, write_atomic, write_error
 from artsim.errors import ArtsimError, ConfigError, DatasetError
 
+log = logging.getLogger(__name__)
+
 T = TypeVar("T")
 
 _ATTEMPTS = 8
 """Of one request: a storage that fails every tenth one then fails once in a hundred million."""
 _FIRST_PAUSE, _LONGEST_PAUSE = 0.1, 10.0
 """Seconds before the second attempt, doubled from then on; half of it is random: workers do not come together."""
+_LONG = 2.0
+"""Seconds after which somebody who waits for an answer is told what for."""
 _OF_BUCKETS = ("s3", "s3a", "gs", "gcs", "az", "abfs", "oss")
 """Protocols whose first name is that of a bucket, or container."""
 _MISSING = "restore it, or make the dataset again"
 _WRITE = "be written", ConfigError
+
+
+@functools.cache
+def _say_waiting(place: str) -> None:
+    """Say once in a process that a storage lets it wait."""
+    log.info(f"waiting for {place}: a storage that does not answer is given up after {_ATTEMPTS} attempts")
 
 
 class Storage(Protocol):
@@ -214,7 +227,16 @@ class UrlStorage(Storage):
     def _try(
         self, name: str, work: Callable[[], T], doing: str = "be read", kind: type[ArtsimError] = DatasetError
     ) -> T:
-        """Do something with a file, again after a while where it fails."""
+        """Do something with a file, again after a while where it fails; one word of it where that takes long."""
+        waiting = threading.Timer(_LONG, _say_waiting, [self.place])
+        waiting.daemon = True
+        waiting.start()
+        try:
+            return self._attempts(name, work, doing, kind)
+        finally:
+            waiting.cancel()
+
+    def _attempts(self, name: str, work: Callable[[], T], doing: str, kind: type[ArtsimError]) -> T:
         for attempt in range(_ATTEMPTS):
             try:
                 return work()
@@ -235,6 +257,8 @@ class UrlStorage(Storage):
                 if "Credentials" in type(error).__name__:  # botocore's; no later attempt finds any
                     break
             if attempt + 1 < _ATTEMPTS:
+                why = f"cannot {doing} ({type(reason).__name__})"
+                log.info(f"{self.place}/{name}: {why}; attempt {attempt + 2} of {_ATTEMPTS}")
                 pause = min(_LONGEST_PAUSE, _FIRST_PAUSE * 2.0**attempt)
                 time.sleep(pause * random.uniform(0.5, 1.0))
         text = f"{type(reason).__name__}: {reason}"

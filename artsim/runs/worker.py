@@ -1,5 +1,6 @@
 """A process that does the tasks of a run: what it keeps between them, and what it says to its parent."""
 
+import contextlib
 import multiprocessing
 import os
 import signal
@@ -11,6 +12,7 @@ from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
 from artsim.common.extras import import_failure
+from artsim.common.messages import Messages
 from artsim.errors import ArtsimError, DatasetError
 
 T = TypeVar("T")
@@ -51,8 +53,13 @@ def set_worker(worker: Worker) -> None:
     _worker = worker
 
 
-def serve(connection: Connection, context: Any) -> None:
+def serve(connection: Connection, context: Any, messages: Messages | None) -> None:
     """Do what the parent asks for until it says None, or is gone. The parent answers Ctrl-C."""
+    with contextlib.nullcontext() if messages is None else messages.shown():
+        _serve(connection, context)
+
+
+def _serve(connection: Connection, context: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     assert parent is not None

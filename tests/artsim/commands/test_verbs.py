@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -46,6 +47,18 @@ def test_without_words_a_list_of_commands_fits_a_screen(program: str) -> None:
     assert len(bare.stdout.splitlines()) <= 50
     assert "Exit codes: 0" in bare.stdout
     assert run(program, "--completion", "fishing").returncode == 2
+
+
+def test_help_of_a_command_fits_a_tall_screen_and_names_every_option() -> None:
+    for program, verb in ((ARTSIM, "generate"), (ARTSIM, "scene"), ("artperl", "estimate"), ("artperl", "train")):
+        brief, full = (run(program, verb, "--help", *more).stdout for more in ((), ("--verbose",)))
+        assert len(brief.splitlines()) <= 60
+        assert all(len(line) <= 150 for line in brief.splitlines())
+        assert len(full.split()) > 1.2 * len(brief.split())
+        options = re.findall(r"^(?:\W*)(--[a-z][\w.-]*\w)", full, re.MULTILINE)
+        assert len(options) > 20
+        assert {*options} <= {*re.findall(r"--[\w.-]+", brief)}
+        assert brief.rindex("--quiet") > brief.rindex("--seed" if verb == "generate" else "--workers")
 
 
 def test_bash_completes_commands_options_and_choices(tmp_path: Path) -> None:
@@ -108,7 +121,7 @@ def test_generate_verify_and_view_work_together(tmp_path: Path) -> None:
     options = "--num-samples 20 --scale 0.5 1.0 --states.joint-range screen -1.5 0 --images depth part_mask"
     made = run(GENERATE, "--objects", "urdf_assets/laptop", "urdf_assets/scissors", "--out", str(out), *options.split())
     assert made.returncode == 0, made.stderr
-    assert "20 samples" in made.stdout
+    assert "20 samples" in made.stderr
     assert "sound" in run(ARTSIM, "verify", str(out)).stdout
     (out / "plan.json").write_text("{")
     shutil.copy(out / "train-000000.tar", out / "mine.tar")
@@ -122,7 +135,7 @@ def test_generate_verify_and_view_work_together(tmp_path: Path) -> None:
     assert "mine.tar: is no part of this dataset. Fix: move it out of the folder, or delete it" in refused.stdout
     (out / "mine.tar").unlink()
     assert f"{out}: nothing to repair" in run(ARTSIM, "repair", str(out)).stdout
-    assert "already complete, 20 samples" in run(*made.args).stdout
+    assert "already complete, 20 samples" in run(*made.args).stderr
     view = run(ARTSIM, "view", str(out), "--samples", "2", "--rerun", str(tmp_path / "r.rrd"))
     assert view.returncode == 0, view.stderr
     assert (out / "contact_sheet.png").stat().st_size > 10_000
@@ -147,9 +160,9 @@ def test_constraints_are_met_and_impossible_ones_refused(tmp_path: Path) -> None
     rows = (tmp_path / "out" / "index.csv").read_text().splitlines()[1:]
     assert all("door_1" in row and "door_2" not in row and "drawer_0" in row for row in rows)
     again = run(ARTSIM, "generate-objects", *options, "--having", "doors=2", "drawers=1..3")
-    assert "already complete" in again.stdout
+    assert "already complete" in again.stderr
     other = run(ARTSIM, "generate-objects", *options, "--having", "doors=1")
-    assert "2 objects made now" in other.stdout
+    assert "2 objects made now" in other.stderr
     for having in ("doors=90", "doors", "handles=perhaps"):
         refused = run(ARTSIM, "generate-objects", *options, "--having", having)
         assert refused.returncode == 2
