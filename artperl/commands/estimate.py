@@ -148,7 +148,7 @@ class Estimate(EstimateOptions):
         for text in result.warnings:
             log.warning(text)
         if self.out == STDOUT:
-            print(json.dumps(result.to_dict() | {"notes": notes}, indent=1))
+            print(json.dumps(result.to_dict() | {"notes": notes}))
             return
         print(replace(result, warnings=()))
         if self.out is not None:

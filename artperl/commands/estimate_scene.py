@@ -76,7 +76,7 @@ def estimate_scene(options: EstimateOptions) -> None:
             export_scene(result, part)
     record = scene_record(result, detections)
     if options.out == STDOUT:
-        print(json.dumps(record, indent=1))
+        print(json.dumps(record))
         return
     print(result)
     stages = ", ".join(f"{name} {value:.0f} ms" for name, value in result.milliseconds.items())

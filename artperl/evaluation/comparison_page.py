@@ -58,17 +58,15 @@ def _table(benchmark: str, category: str, methods: Mapping[str, dict[str, Any]],
     _, _, factor, digits, key = next(column for column in COLUMNS if column[0] == name)
     parts = max(len(record["parts"]) for record in methods.values())
     known = published_of(benchmark, category) if key else {}
-    head = ["method", *(f"part {k}" for k in range(parts)), *(f"published, part {k}" for k in range(parts) if known)]
+    head = ["method", *(f"part {k}" for k in range(parts))]
     lines = [_line(head), _line(["---"] * len(head))]
-    told_by = [method for method, published in known.items() if getattr(published, key)]
-    for method in dict.fromkeys([*methods, *told_by]):
-        cells = [TITLES.get(method, method)]
-        for k in range(parts):
-            cells.append(_cell(methods[method]["parts"], k, name, factor, digits) if method in methods else "")
-        told = getattr(known[method], key) if method in known and key else ()
-        # Nothing that is measured here stands in these columns: the images differ.
-        cells += [f"{factor * told[k]:.{digits}f}" if k < len(told) else "" for k in range(parts) if known]
-        lines.append(_line(cells))
+    for method, record in methods.items():
+        cells = [_cell(record["parts"], k, name, factor, digits) for k in range(parts)]
+        lines.append(_line([TITLES.get(method, method), *cells]))
+    for method, published in known.items():  # in rows of their own: the images differ
+        if told := getattr(published, key):
+            cells = [f"{factor * told[k]:.{digits}f}" if k < len(told) else "" for k in range(parts)]
+            lines.append(_line([f"{TITLES.get(method, method)}, published", *cells]))
     return lines
 
 

@@ -15,7 +15,7 @@ from artperl.evaluation.metrics import true_poses
 from artperl.evaluation.scoring import compare
 from artperl.methods.protocol import Method
 from artsim.common.extras import require_extra
-from artsim.common.names import printable
+from artsim.common.names import numbered, printable
 from artsim.common.palette import PALETTE
 from artsim.errors import ArtsimError
 from artsim.model.camera import Camera
@@ -62,7 +62,7 @@ def curves(events: Path) -> bytes:
     for number, (tag, title) in enumerate(known):
         axes = figure.add_subplot(rows, 3, number + 1)
         steps = np.array([(event.step, event.value) for event in log.Scalars(tag)])
-        axes.plot(*steps.T, color="#9bbcd8", linewidth=0.7)
+        axes.plot(*steps.T, color="#9bbcd8", linewidth=0.7, marker="o" if len(steps) < 3 else "")
         width = max(1, len(steps) // 40)
         smooth = np.convolve(steps[:, 1], np.ones(width) / width, mode="valid")
         axes.plot(steps[width - 1 :, 0], smooth, color="#0072b2", linewidth=1.6)
@@ -105,12 +105,15 @@ def _overlay(axes: Axes, sample: Sample, estimate: Estimate) -> None:
     for k in range(len(estimate.state)):
         colour = tuple(PALETTE[k % len(PALETTE)] / 255)
         _box(axes, camera, estimate.rotation[k], estimate.translation[k], estimate.size[k], color=colour, linewidth=1.1)
-    name = printable(f"{sample.category} {sample.object_id}", 60)
-    title = f"{name}, confidence {100 * estimate.confidence:.0f} %"
+    name = printable(f"{sample.category}, object {sample.object_id}", 60)
+    title = f"{name}: confidence {100 * estimate.confidence:.0f} %"
     if len(estimate.state) == len(sample.joint_type):
         error = compare(estimate, sample, 0.0)
-        title += "\n" + " ".join(f"{x:.1f}°" for x in error.rotation)
-        title += "\n" + " ".join(f"{100 * x:.1f}" for x in error.translation) + " %"
+        told = [
+            f"{printable(part, 16)} {turn:.1f}° {100 * shift:.1f} %"
+            for part, turn, shift in zip(numbered(sample.part_names), error.rotation, error.translation, strict=True)
+        ]
+        title += "".join(f"\n{', '.join(told[k : k + 2])}" for k in range(0, len(told), 2))
     axes.set_title(title, fontsize=7, parse_math=False)  # a dollar sign in a name begins no formula
     axes.set_aspect("equal")
     axes.invert_yaxis()

@@ -11,7 +11,7 @@ from artperl.evaluation.part_detection import part_figures, part_line
 from artperl.evaluation.published import ARTIMAGE_PUBLISHED
 from artperl.evaluation.reliability import confidence_figures, confidence_line
 from artperl.evaluation.scoring import Scored
-from artsim.common.names import printable
+from artsim.common.names import numbered, printable
 
 Array = NDArray[np.float64]
 
@@ -26,19 +26,19 @@ def summary(scored: Sequence[Scored]) -> dict[str, Any]:
     -------
     dict
         ``{category: {"parts": [{metric: {"median": x, "mean": x}}], "failures": n, "instances": n,
-        "ms_per_instance": median, ...}}``, without the metrics that do not apply; ``"part_names"`` where all objects
-        have the same; and ``"up_to_symmetry"`` for categories with objects that look the same turned round.
+        "ms_per_instance": median, ...}}``, without the metrics that do not apply; ``"part_names"``, "part 3" where
+        those of objects differ; and ``"up_to_symmetry"`` for categories with objects that look the same turned round.
     """
     return {category: _category_summary(scored, category) for category in dict.fromkeys(s.category for s in scored)}
 
 
 def _category_summary(scored: Sequence[Scored], category: str) -> dict[str, Any]:
     own = [s for s in scored if s.category == category]
-    names = {s.part_names for s in own}
+    names = [{s.part_names[k] for s in own if k < len(s.part_names)} for k in range(max(len(s.rotation) for s in own))]
     right, confidence = np.array([s.right for s in own]), np.array([s.confidence for s in own])
     return {
-        "parts": [_part_summary(own, k) for k in range(max(len(s.rotation) for s in own))],
-        **({"part_names": list(names.pop())} if len(names) == 1 else {}),
+        "parts": [_part_summary(own, k) for k in range(len(names))],
+        "part_names": [min(alike) if len(alike) == 1 else f"part {k}" for k, alike in enumerate(names)],
         "instances": len(own),
         "failures": sum(s.failed for s in own),
         "right": float(right.mean()),
@@ -87,8 +87,7 @@ def table(figures: dict[str, Any]) -> str:
     """
     columns = {name: metric for name, metric in METRICS.items() if metric.title}
     labels = {
-        category: [f"{category} {name}" for name in figure.get("part_names") or range(len(figure["parts"]))]
-        for category, figure in figures.items()
+        category: [f"{category} {name}" for name in numbered(own["part_names"])] for category, own in figures.items()
     }
     width = max([_NAME, *(len(label) + 1 for own in labels.values() for label in own)])
     lines = [

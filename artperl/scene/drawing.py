@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ from artperl.scene.estimator import SceneEstimate
 from artsim.common.names import printable
 from artsim.common.palette import PALETTE
 from artsim.model.camera import Camera
+
+Rectangle: TypeAlias = "tuple[float, float, float, float]"
 
 _OVER = 2  # drawn larger, then reduced: smooth lines
 _NEAREST = 1e-3  # metres before the camera: what comes nearer is not drawn
@@ -67,10 +70,12 @@ def draw_scene(rgb: NDArray[np.uint8], K: NDArray[np.float64], scene: SceneEstim
         if obj.estimate is not None and obj.estimate.confidence >= _SURE:
             _draw_boxes(draw, obj.estimate, camera, number)
             _draw_axes(draw, obj.estimate, camera)
+    taken: list[Rectangle] = []
     for number, obj in enumerate(scene.objects):  # on top of all lines
         unsure = "" if obj.estimate is None or obj.estimate.confidence >= _SURE else ", not drawn"
         sure = "no estimate" if obj.estimate is None else f"{100 * obj.score:.0f} %{unsure}"
-        _label(draw, obj.detection.box, f"{number} {printable(obj.detection.category, 40)} {sure}", number, height)
+        text = f"{number} {printable(obj.detection.category, 40)} {sure}"
+        taken.append(_label(draw, obj.detection.box, text, number, height // 20, taken))
     buffer = io.BytesIO()
     canvas.resize((width, height), Image.Resampling.BOX).save(buffer, "PNG")
     return buffer.getvalue()
@@ -110,13 +115,18 @@ def _draw_axes(draw: ImageDraw.ImageDraw, estimate: Estimate, camera: Camera) ->
 
 
 def _label(
-    draw: ImageDraw.ImageDraw, box: tuple[float, float, float, float], text: str, number: int, height: int
-) -> None:
+    draw: ImageDraw.ImageDraw, box: Rectangle, text: str, number: int, size: int, taken: Sequence[Rectangle]
+) -> Rectangle:
+    """Draw a detection and its label, below what labels have taken: the place of the label."""
     left, top, width, tall = (v * _OVER for v in box)
     colour = _colour(3 * number)
     draw.rectangle((left, top, left + width - 1, top + tall - 1), outline=colour, width=1)
-    size = 5 * _OVER + height // 50
     place = (left + 4, max(top - size - 6, 2))
-    draw.rectangle(draw.textbbox(place, text, font_size=size), fill=colour)
+    ends = draw.textbbox(place, text, font_size=size)
+    while any(ends[0] < e and ends[1] < s and ends[2] > w and ends[3] > n for w, n, e, s in taken):
+        place = (place[0], place[1] + size)
+        ends = draw.textbbox(place, text, font_size=size)
+    draw.rectangle(ends, fill=colour)
     bright = float(np.dot(colour, _LUMA)) > _BRIGHT
     draw.text(place, text, fill=(0, 0, 0) if bright else (255, 255, 255), font_size=size)
+    return ends

@@ -303,7 +303,7 @@ def notes(options: ComparisonOptions) -> list[str]:
     length = "" if options.minutes is None else f", stages scaled to {options.minutes:g} minutes of one core each"
     lines = [
         f"Trainings have the preset {options.preset}{train}{length}.",
-        f"{objects} Published figures are of other images, in separate columns.",
+        f"{objects} Published figures are of other images, in separate rows.",
         "Brackets have the 95 % interval of the mean, by a bootstrap over objects.",
         *(["These trainings are far too short: no figure of them says anything of a method."] if options.train else []),
         "A failure counts as 180 degrees, one diagonal and no overlap. No view is left out.",
