@@ -49,8 +49,7 @@ def _rigid(draws: Draws) -> Assembly:
     chest = Assembly("body", body, 700.0)
     if draws.chance("two_lids", 0.12) and radius == 0.0:  # hinged at the left and the right
         chest.record(handles=True)
-        limit = draws.turn("lid_angle", (80.0, 175.0))
-        thick = wall * draws.number("lid_thickness", (0.6, 1.2))
+        limit, thick = draws.turn("lid_angle", (80.0, 175.0)), wall * draws.number("lid_thickness", (0.6, 1.2))
         for number, (sign, axis) in enumerate(((1, (-1, 0, 0)), (-1, (1, 0, 0)))):
             lid = box(x, (sign * y, sign * GAP), (seam, seam + thick))
             lid += knob((0, sign * 0.12 * y, seam + thick), (0, 0, 1), 0.05 * y, 0.04 * y)

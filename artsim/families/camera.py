@@ -234,8 +234,7 @@ def _flash(draws: Draws, camera: Assembly, shell: Shell, span: tuple[float, floa
 def _camcorder(draws: Draws) -> Assembly:
     """A long body with a screen at its left side, a strap at its right, and a viewfinder at the back."""
     half, height = 0.5 * draws.length("width", (0.044, 0.09)), draws.length("height", (0.05, 0.085))
-    depth = draws.length("depth", (0.09, 0.2))
-    lens_z = height * draws.number("lens_height", (0.5, 0.62))
+    depth, lens_z = draws.length("depth", (0.09, 0.2)), height * draws.number("lens_height", (0.5, 0.62))
     r = draws.number("edge_radius", (0.1, 0.6)) * half
     axis = draws.one_of("round_edges", {"all": None, "lengthwise": 0, "crosswise": 1})
     body = box((0, depth), half, (0, height), fillet=r, axis=axis)

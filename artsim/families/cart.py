@@ -73,8 +73,7 @@ def _hand_truck(draws: Draws) -> Assembly:
     """An upright frame on two wheels, with a toe plate in front and a handle on top."""
     wheels = Wheels(draws, (0.07, 0.14), (0.03, 0.06))
     half, height = 0.5 * draws.length("width", (0.3, 0.5)), draws.length("height", (0.7, 1.25))
-    r = draws.length("tube_radius", (0.01, 0.016))
-    slides = draws.chance("handle_slides", 0.45)
+    r, slides = draws.length("tube_radius", (0.01, 0.016)), draws.chance("handle_slides", 0.45)
     shape = draws.pick("handle", ["bow", "bar", "grips"])
     body = union(tube([(0.0, s * half, 0.02), (0.0, s * half, height)], r, 10) for s in (-1.0, 1.0))
     for share in np.linspace(0.08, 0.95 if slides else 0.75, draws.integer("crossbars", 3, 5)).tolist():
@@ -135,8 +134,7 @@ def _service_trolley(draws: Draws) -> Assembly:
     depth, half = 0.5 * draws.length("depth", (0.34, 0.6)), 0.5 * draws.length("width", (0.4, 0.84))  # half of each
     wheels = Wheels(draws, (0.025, 0.055), (0.016, 0.028), 0.28 * (depth - 0.02))
     base = wheels.caster_height + 0.004
-    top = base + draws.length("height", (0.45, 0.9))
-    post = draws.length("post_radius", (0.008, 0.016))
+    top, post = base + draws.length("height", (0.45, 0.9)), draws.length("post_radius", (0.008, 0.016))
     body = Solid()
     closed = draws.chance("cabinet", 0.5)
     cart = Assembly("body", density=500.0)
@@ -221,8 +219,7 @@ def _wheelbarrow(draws: Draws) -> Assembly:
     rim = [np.array([x, y, low + deep]) for x, y in plan]
     body = slab(floor, thick) + union(slab([floor[k - 1], floor[k], rim[k - 1], rim[k]], thick) for k in range(4))
     body += tube(np.array(rim), 0.012, 8, closed=True)
-    r = draws.length("shaft_radius", (0.014, 0.02))
-    twin = draws.chance("twin_wheels", 0.25)
+    r, twin = draws.length("shaft_radius", (0.014, 0.02)), draws.chance("twin_wheels", 0.25)
     # The wheel stands clear of the front wall, which leans forward.
     levels = np.linspace(low, 2.0 * wheels.radius, 12)
     wall = flare + (front - flare) * (levels - low) / deep

@@ -21,8 +21,7 @@ LEAST_SHARES, MOST_SHARES = (0.29, 0.43, 0.075), (0.765, 0.95, 0.79)
 def carton(draws: Draws) -> Assembly:
     """Cardboard box; the longer flaps hang on the front and the back."""
     width = draws.length("width", (0.18, 0.6))
-    depth = width * draws.number("depth", (0.5, 1.0))
-    height = width * draws.number("height", (0.3, 1.3))
+    depth, height = width * draws.number("depth", (0.5, 1.0)), width * draws.number("height", (0.3, 1.3))
     if draws.chance("unusual", 0.3):
         depth, width, height = unusual_sides(draws, LEAST_SHARES, MOST_SHARES, (0.14, 0.18, 0.06))
     wall = draws.length("wall", (0.003, 0.005))

@@ -27,8 +27,7 @@ def build(draws: Draws) -> Assembly:
     wheel, column = draws.lengths(wheel_radius=(0.022, 0.032), column_radius=(0.022, 0.03))
     floor = 2.0 * wheel + 0.024 if castors else 0.0
     piston = column - 0.004 - GAP
-    stool = draws.chance("stool", 0.25)
-    hub = floor + draws.length("hub_height", (0.05, 0.09))
+    stool, hub = draws.chance("stool", 0.25), floor + draws.length("hub_height", (0.05, 0.09))
     sleeve = hub + draws.length("column_height", (0.1, 0.45) if stool else (0.08, 0.22))
     travel = 0.6 * (sleeve - hub)
     low = sleeve + draws.length("seat_gap", (0.05, 0.1))
@@ -83,8 +82,7 @@ def _sliding_arms(draws: Draws, chair: Assembly, depth: float, width: float, top
     y, z = 0.5 * width + 0.04, top + 0.08 + GAP
     half = 0.5 * draws.length("armrest_width", (0.05, 0.1))
     fore = draws.number("armrest_front", (0.2, 0.35)) * depth
-    aft = draws.number("armrest_back", (0.15, 0.3)) * depth
-    travel = draws.length("armrest_travel", (0.04, 0.09))
+    aft, travel = draws.number("armrest_back", (0.15, 0.3)) * depth, draws.length("armrest_travel", (0.04, 0.09))
     for number, side in enumerate((-1, 1)):
         arm = box((-fore, aft), about(side * y, half), (z, z + 0.03), fillet=0.012)
         arm += box(0.016, about(side * y, 0.006), (z - travel - 0.03, z + 0.01))
@@ -118,8 +116,7 @@ def _star(draws: Draws, legs: int, span: float, floor: float, hub: float, column
         solid += rod(0, 0, (0, thick), 0.85 * span, 0.8 * span, 36)
         return solid + rod(0, 0, (thick - 0.002, hub), 0.5 * span, 1.35 * column, 24)
     wide = 0.5 * draws.length("leg_width", (0.044, 0.06))
-    narrow = 0.5 * draws.length("leg_tip_width", (0.028, 0.04))
-    slope = draws.number("leg_slope", (0.0, 0.7))
+    narrow, slope = 0.5 * draws.length("leg_tip_width", (0.028, 0.04)), draws.number("leg_slope", (0.0, 0.7))
     root = box(0.01, wide, (low + slope * (hub - low - 0.04), hub - 0.006), fillet=0.006)
     leg = hull_of(root, box((span - 0.02, span + 0.02), narrow, (low, low + 0.022), fillet=0.006))
     if floor == 0:
@@ -169,11 +166,9 @@ def _seat(draws: Draws, depth: float, width: float, thick: float, low: float, st
 
 def _back(draws: Draws, width: float, top: float, hinge: Array) -> Solid:
     """Back rest on a spine that starts at the hinge; it may carry a head rest."""
-    tall = draws.length("back_height", (0.35, 0.65))
-    low = top + draws.length("back_gap", (0.03, 0.1))
+    tall, low = draws.length("back_height", (0.35, 0.65)), top + draws.length("back_gap", (0.03, 0.1))
     half = 0.5 * width * draws.number("back_width", (0.75, 1.0))
-    thick = draws.length("back_thickness", (0.03, 0.06))
-    lean = draws.angle("back_lean", (0.05, 0.2))
+    thick, lean = draws.length("back_thickness", (0.03, 0.06)), draws.angle("back_lean", (0.05, 0.2))
     x = hinge[0] + 0.025
     solid = rod(hinge[0], (-0.028, 0.028), hinge[2], 0.012, sections=16)
     solid += tube(np.array([[*hinge], [x + 0.02, 0, hinge[2] + 0.01], [x + 0.03, 0, low + 0.3 * tall]]), 0.016, 10)

@@ -97,8 +97,7 @@ def _knobs(draws: Draws, clock: Assembly, x: float, spread: float) -> None:
 
 def _longcase_clock(draws: Draws) -> Assembly:
     """A tall case on the floor: a hood with the face, a trunk with pendulum and weights, a plinth."""
-    radius = 0.5 * draws.length("diameter", (0.22, 0.34))
-    deep = draws.length("depth", (0.18, 0.28))
+    radius, deep = 0.5 * draws.length("diameter", (0.22, 0.34)), draws.length("depth", (0.18, 0.28))
     hood = 0.5 * draws.length("hood_width", (1.15, 1.45), of=2 * radius)
     trunk = 0.5 * draws.length("trunk_width", (0.65, 0.95), of=2 * hood)
     foot = 0.5 * draws.length("plinth_width", (1.05, 1.4), of=2 * trunk)

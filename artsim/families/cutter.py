@@ -27,8 +27,7 @@ class _Case:
         self.wall = min(draws.length("wall", (0.0016, 0.003)), 0.22 * self.height)
         self.blade_half = (self.half - self.wall - GAP) * draws.number("blade_width", (0.8, 1.0))
         self.slot = self.blade_half * draws.number("slot_width", (0.3, 0.5))
-        self.nose = length * draws.number("nose_length", (0.02, 0.16))
-        self.capped = draws.chance("cap", 0.45)
+        self.nose, self.capped = length * draws.number("nose_length", (0.02, 0.16)), draws.chance("cap", 0.45)
         self.front = -0.5 * length
         self.end = 0.5 * length - (draws.length("cap_length", (0.008, 0.018)) if self.capped else 0.0)
         self.channel, self.sheet = 0.5 * self.height - 0.0006, 0.0014  # bottom and thickness of the blade
@@ -77,8 +76,7 @@ def _body(draws: Draws, c: _Case) -> Solid:
     mouth = c.nose * draws.number("mouth", (0.0, 0.4))  # one side of the channel begins further back
     narrow = c.inner + 0.3 * (half - c.inner)
     outer = np.array([(front, narrow), (front + c.nose, half), (back, half)])
-    bulge = half * draws.number("bulge", (0.0, 0.6))
-    bulges = draws.chance("bulges", 0.5)
+    bulge, bulges = half * draws.number("bulge", (0.0, 0.6)), draws.chance("bulges", 0.5)
     plan = np.concatenate([outer, outer * (1, -1)])
     solid = prism(plan, 0.12 * height, c.channel - GAP) + prism(plan * (0.99, 0.86), 0.0, 0.2 * height)
     for side in (-1, 1):

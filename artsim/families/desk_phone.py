@@ -26,8 +26,7 @@ def desk_set(draws: Draws, phone: Assembly) -> None:
         for x, y in corners
     ]
     base = hull([(x, y, z) for x, y in corners for z in (0.0, 0.3 * front)] + upper)
-    across = draws.chance("handset_at_back", 0.4)
-    grip = draws.length("handset_width", (0.018, 0.03))
+    across, grip = draws.chance("handset_at_back", 0.4), draws.length("handset_width", (0.018, 0.03))
     deck = Face(np.array([-0.5 * reach, 0.0, front]), np.array([0.0, -1.0, 0.0]), slope)
     run = reach / slope[0]
     if across:
@@ -70,8 +69,7 @@ def _handset(
 ) -> None:
     """A bar between two round or square ends that lie on the cradle; it is lifted off."""
     thick = grip * draws.number("thickness", (0.7, 1.2))
-    bow = draws.number("bow", (0.1, 0.9)) * thick
-    square = draws.chance("square_ends", 0.5)
+    bow, square = draws.number("bow", (0.1, 0.9)) * thick, draws.chance("square_ends", 0.5)
     rings = []
     for s in np.linspace(-1.0, 1.0, 7):
         rise = thick + bow * (1.0 - s * s)

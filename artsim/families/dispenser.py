@@ -178,16 +178,14 @@ def _drink_jar(draws: Draws) -> Assembly:
     count = draws.pick("levers", {1: 0.8, 2: 0.2})
     spots = [0.0] if count == 1 else [-0.33 * wide, 0.33 * wide]
     r = draws.length("tap_radius", (0.008, 0.012))
-    out = -wide - (draws.length("tap_reach", (0.03, 0.06)) + r)
-    rise = r * draws.number("tap_rise", (1.3, 2.0))
+    out, rise = -wide - (draws.length("tap_reach", (0.03, 0.06)) + r), r * draws.number("tap_rise", (1.3, 2.0))
     for y in spots:
         body += rod((-0.4 * wide, out), y, z, r, sections=16)
         body += rod(out, y, (z - 0.035, z + rise), 1.15 * r, sections=16)
         body += ring((-0.985 * wide, y, z), (1, 0, 0), 0.5 * r, 1.9 * r, 0.01, 16)
     dispenser = Assembly("body", body, DENSITY)
     dispenser.add("lid", *_jar_lid(draws, shares[-1][1] * half, top))
-    style = draws.pick("tap", ["lever", "wing", "flip"])
-    long = draws.length("lever_length", (0.03, 0.06))
+    style, long = draws.pick("tap", ["lever", "wing", "flip"]), draws.length("lever_length", (0.03, 0.06))
     for number, y in enumerate(spots):
         at = np.array([out, y, z + rise + 0.001])
         solid, joint = _tap_handle(draws, style, at, r, min(long, 0.28 * wide if count > 1 else long))

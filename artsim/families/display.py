@@ -30,8 +30,7 @@ def _keys(draws: Draws, display: Assembly, parent: str, face: Face, half: float,
     """A row of keys to one side of a chin, on some; returns how many."""
     if not draws.chance("button", 0.65, upper=True) or size < 0.004:
         return 0
-    count = draws.integer("buttons", 1, 6)
-    wide = min(draws.number("button_width", (0.8, 2.5)) * size, 0.028)
+    count, wide = draws.integer("buttons", 1, 6), min(draws.number("button_width", (0.8, 2.5)) * size, 0.028)
     kind = draws.pick("button_shape", ["round", "square", "pill"])
     side = draws.one_of("button_side", {"left": -1.0, "middle": 0.0, "right": 1.0})
     travel = draws.length("button_travel", (0.0008, 0.0015))
@@ -255,8 +254,7 @@ def _tube(draws: Draws, display: Assembly) -> None:
     half = 0.5 * draws.length("width", (0.28, 0.76))
     rise = 0.5 * draws.length("height", (0.7, 1.05), of=2.0 * half)
     depth = draws.length("depth", (1.2, 2.3), of=half)
-    cabinet = draws.length("cabinet_depth", (0.2, 0.6), of=depth)
-    foot = draws.length("foot_height", (0.02, 0.07))
+    cabinet, foot = draws.length("cabinet_depth", (0.2, 0.6), of=depth), draws.length("foot_height", (0.02, 0.07))
     chain = _Chain(display)
     swivels = draws.chance("swivels", 0.65)
     if swivels:
@@ -267,8 +265,7 @@ def _tube(draws: Draws, display: Assembly) -> None:
         chain.solid = rod(0, 0, (thick + GAP, foot + 0.004), 0.35 * half, 0.5 * half, 24)
     else:
         chain.name = "body"
-        splay = draws.number("leg_splay", (1.0, 1.3))
-        leg = draws.length("leg_radius", (0.008, 0.02))
+        splay, leg = draws.number("leg_splay", (1.0, 1.3)), draws.length("leg_radius", (0.008, 0.02))
         x0 = -0.5 * cabinet
         for a, s in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
             tip = (x0 + a * splay * 0.4 * cabinet, s * splay * 0.75 * half, 0.0)
@@ -280,8 +277,7 @@ def _tube(draws: Draws, display: Assembly) -> None:
     # A strip for knobs, on the right.
     side = draws.number("knob_strip", (0.3, 0.6)) * half if draws.chance("knob", 0.4) else 0.0
     chin = draws.number("chin", (0.1, 0.3)) * rise if side == 0 else 0.0
-    lip = draws.length("lip", (0.006, 0.02))
-    corner = draws.number("corner", (0.02, 0.2)) * rise
+    lip, corner = draws.length("lip", (0.006, 0.02)), draws.number("corner", (0.02, 0.2)) * rise
     shell = box((front + lip, front + cabinet), half, (low, high), fillet=corner, axis=0)
     inset = 0.08 * rise
     corners = (front, inset - half, low + inset), (front + lip + 0.001, half - inset, high - inset)

@@ -117,8 +117,7 @@ def _chest(draws: Draws, furniture: _Furniture) -> None:
     rows = draws.integer("rows", 1, max(2, 6 // columns))
     width = columns * draws.length("width", (0.28, 0.6) if columns > 1 else (0.3, 0.9))
     depth, height = draws.length("depth", (0.3, 0.65)), rows * draws.length("height", (0.1, 0.28))
-    wall = draws.length("board", (0.012, 0.03))
-    raised = draws.chance("raised", 0.4)
+    wall, raised = draws.length("board", (0.012, 0.03)), draws.chance("raised", 0.4)
     legs = draws.length("stand_height", (0.08, 0.45) if raised else (0.0, 0.1))
     if draws.chance("unusual", 0.45):
         depth, width, height = unusual_sides(draws, _LEAST_SHARES, _MOST_SHARES, (0.24, 0.3, 0.2))
@@ -202,8 +201,7 @@ def _desk(draws: Draws, furniture: _Furniture) -> None:
     x, y, top = depth / 2 - over, width / 2 - over, height - thick
     furniture.body += _top(draws, depth, width, top, height)
     pedestal = min(draws.length("pedestal_width", (0.28, 0.45)), 0.4 * width)
-    sides = draws.one_of("pedestals", PEDESTALS, (0.35, 0.35, 0.3))
-    on_legs = draws.chance("on_legs", 0.4)
+    sides, on_legs = draws.one_of("pedestals", PEDESTALS, (0.35, 0.35, 0.3)), draws.chance("on_legs", 0.4)
     leg = draws.length("leg_width", (0.035, 0.07))
     low = 0.0
     if on_legs:

@@ -118,8 +118,7 @@ def _outline(draws: Draws) -> Array:
     tall = {"round": (0.9, 1.0), "rectangular": (0.48, 0.75), "aviator": (0.78, 0.92), "cat": (0.6, 0.82)}
     exponent = {"round": (2.0, 2.2), "rectangular": (2.8, 5.0)}.get(kind, (2.2, 3.0))
     a = 0.5 * _mm(draws, "width", *wide)
-    b = a * draws.number("height", tall.get(kind, (0.72, 0.95)))
-    n = draws.number("squareness", exponent)
+    b, n = a * draws.number("height", tall.get(kind, (0.72, 0.95))), draws.number("squareness", exponent)
     angles = np.linspace(0.0, 2.0 * np.pi, 26, endpoint=False)
     y, z = (np.sign(share) * power(np.abs(share), 2 / n) for share in (cos(angles), sin(angles)))
     nasal = {"aviator": (0.25, 0.45), "round": (0.0, 0.05)}.get(kind, (0.05, 0.25))

@@ -190,8 +190,7 @@ def _ceiling_fan(draws: Draws) -> Assembly:
         bowl = (0.75 * body, 0.75 * body, draws.length("lamp_height", (0.4, 0.8), of=body))
         rotor += ellipsoid((0, 0, low - tall), bowl, 20)
     half, z = 0.5 * draws.length("blade_width", (0.1, 0.16)), low - 0.6 * tall
-    pitch = draws.turn("blade_pitch", (8.0, 15.0))
-    root = body + draws.length("blade_arm", (0.03, 0.08))
+    pitch, root = draws.turn("blade_pitch", (8.0, 15.0)), body + draws.length("blade_arm", (0.03, 0.08))
     corner = draws.length("blade_corner", (0.2, 1.0), of=half)
     paddle = box((-reach, -root), half, 0.004, fillet=corner, axis=2, steps=4)
     blade = (paddle + box((-root - 0.06, -0.8 * body), 0.02, 0.0055)).turned(FRONT, pitch).moved((0, 0, z))

@@ -116,8 +116,7 @@ def _three_piece(draws: Draws) -> Assembly:
     spout = _gooseneck(draws, column, r, reach, tip)
     tap = Assembly("base", base, BRASS)
     _add_spout(draws, tap, spout, column, 0.6, 0.6)
-    alike = draws.fork("", draws.seed("handle_seed") // 2)
-    outward = draws.chance("handle_outward", 0.6)
+    alike, outward = draws.fork("", draws.seed("handle_seed") // 2), draws.chance("handle_outward", 0.6)
     handle = _handle(alike, hub, length, False)
     for number, side in enumerate((-1.0, 1.0)):
         pivot = np.array([0.0, side * spread, height])
@@ -180,8 +179,7 @@ def _wall_tap(draws: Draws) -> Assembly:
 
 def _body(draws: Draws, radius: float, height: float) -> Solid:
     """Upright body on a foot."""
-    foot = draws.length("base_radius", (1.1, 1.5), of=radius)
-    thick = draws.length("base_height", (0.004, 0.012))
+    foot, thick = draws.length("base_radius", (1.1, 1.5), of=radius), draws.length("base_height", (0.004, 0.012))
     kind = draws.pick("body", {"round": 0.4, "tapered": 0.25, "square": 0.15, "turned": 0.2})
     if kind == "square":
         s = 0.95 * radius

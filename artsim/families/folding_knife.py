@@ -19,8 +19,7 @@ RING = 16
 
 def build(draws: Draws) -> Assembly:
     """A knife, folded at rest. Blades turn about vertical pins at the ends of the handle."""
-    length = draws.log_length("length", 0.125, -0.733, 0.733)
-    stout = draws.chance("stout", 0.1, upper=True)
+    length, stout = draws.log_length("length", 0.125, -0.733, 0.733), draws.chance("stout", 0.1, upper=True)
     half = 0.5 * length * draws.number("width", (0.42, 0.54) if stout else (0.11, 0.42))
     many = draws.chance("pocket_knife", 0.4)
     layers = draws.integer("layers", 2, 4) if many else 1

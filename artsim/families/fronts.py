@@ -169,8 +169,7 @@ def _interior(draws: Draws, cell: Cell, style: Style) -> tuple[Solid, list[Movin
         return _shelves(draws, cell, front, style), []
     count = draws.integer("trays", 1, min(3, int(height // 0.16) + 1))
     pitch = height / count
-    share = draws.number("tray_depth", (0.5, 0.65))
-    wall = draws.number("tray_height", (0.25, 0.7)) * pitch
+    share, wall = draws.number("tray_depth", (0.5, 0.65)), draws.number("tray_height", (0.25, 0.7)) * pitch
     trays: list[Moving] = []
     for number in range(count):
         z = cell.low[1] + number * pitch + 0.006

@@ -48,8 +48,7 @@ def wall_clock(draws: Draws) -> Assembly:
 
 def pendulum_clock(draws: Draws) -> Assembly:
     """A case on the wall with a box below, in which a pendulum hangs; or the pendulum hangs free."""
-    radius = 0.5 * draws.length("diameter", (0.12, 0.28))
-    deep = draws.length("depth", (0.05, 0.11))
+    radius, deep = 0.5 * draws.length("diameter", (0.12, 0.28)), draws.length("depth", (0.05, 0.11))
     kind = draws.pick("case", ["round", "octagon", "square", "house", "arch"])
     half = 0.5 * draws.length("case_width", (1.1, 1.35), of=2 * radius)
     body = dial_plate(draws, radius)

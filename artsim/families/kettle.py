@@ -28,8 +28,7 @@ class Pot:
         height = draws.length("height", shares[kind], of=wide)
         shapes = {"stove": ["cone", "drum", "belly", "squat"], "electric": ["cone", "drum", "hourglass", "belly"],
                   "teapot": ["belly", "ball", "squat", "drum", "pear"]}  # fmt: skip
-        shape = draws.pick("shape", shapes[kind])
-        mouth = draws.number("mouth", (0.45, 0.75))
+        shape, mouth = draws.pick("shape", shapes[kind]), draws.number("mouth", (0.45, 0.75))
         if kind == "electric":
             mouth = draws.number("electric_mouth", (0.65, 0.9))
         low = draws.number("bottom_width", (0.8, 0.97))
@@ -164,8 +163,7 @@ def _whistle(draws: Draws, kettle: Assembly, mouth: tuple[Array, Array, float]) 
 def _lid(draws: Draws, pot: Pot, hinged: bool) -> tuple[Solid, float]:
     """The lid and the height of its top."""
     z = pot.top + GAP
-    radius = pot.mouth * draws.number("lid_radius", (0.9, 1.04))
-    rim = draws.length("lid_rim", (0.003, 0.01))
+    radius, rim = pot.mouth * draws.number("lid_radius", (0.9, 1.04)), draws.length("lid_rim", (0.003, 0.01))
     lid = rod(0, 0, (z, z + rim), radius, draws.number("lid_taper", (0.92, 1.0)) * radius)
     rise = radius * draws.one_of("lid_shape", {"flat": 0.06, "arched": draws.number("lid_rise", (0.1, 0.5))})
     lid += dome(draws.number("dome_width", (0.8, 0.92)) * radius, z + rim - 0.0005, rise)

@@ -23,8 +23,7 @@ class Lens:
         self.fixed = Solid()
         self.parts: list[tuple[str, Solid, JointSpec]] = []
         if style == "tubes":
-            long = radius * draws.number("lens_length", (0.25, 0.8))
-            count = draws.integer("tube_count", 1, 3)
+            long, count = radius * draws.number("lens_length", (0.25, 0.8)), draws.integer("tube_count", 1, 3)
             wall = 0.1 * radius
             self.fixed += self._ring(0.5 * long, radius - wall, radius, long, 24)
             if draws.chance("lens_collar", 0.6):

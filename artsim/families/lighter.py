@@ -139,8 +139,7 @@ def _disposable(draws: Draws) -> Assembly:
     reach = -half_x - draws.number("lever_reach", (0.0, 0.35)) * half_x
     if under - height < 0.0025 or end - reach < 0.004:
         return lighter
-    thick = draws.length("lever_thickness", (0.0012, 0.002))
-    slides = draws.chance("lever_slides", 0.5)
+    thick, slides = draws.length("lever_thickness", (0.0012, 0.002)), draws.chance("lever_slides", 0.5)
     travel = 0.5 * (under - height - thick)
     wide, low = 0.8 * half_y, height + travel + GAP if slides else under - thick - GAP
     lever = box((reach, end), wide, (low, low + thick), fillet=0.0005)
@@ -167,8 +166,7 @@ def _long(draws: Draws) -> Assembly:
     neck = draws.number("neck", (0.5, 0.9))
     body += _layers(outline, [(1.0, slot_high), (neck, handle)])
     body += box((-half_x + depth + 0.004, 0.9 * half_x), 0.55 * half_y, (slot_low - 0.001, slot_high + 0.001))
-    guard = draws.chance("guard", 0.4)
-    out = draws.length("trigger_reach", (0.004, 0.01))
+    guard, out = draws.chance("guard", 0.4), draws.length("trigger_reach", (0.004, 0.01))
     if guard:
         low, high = (-half_x - out - 0.008, 0, slot_low - 0.002), (-half_x - out - 0.01, 0, slot_high + 0.002)
         body += tube(

@@ -18,10 +18,8 @@ GAP = 0.0015
 
 def build(draws: Draws) -> Assembly:
     """A microwave oven, closed at rest. The back of its door is the plane x = 0."""
-    width = draws.length("width", (0.42, 0.62))
-    depth = draws.length("depth", (0.30, 0.48), (0.16, 0.62))
-    height = draws.length("height", (0.23, 0.37), (0.2, 0.46))
-    wall = draws.length("wall", (0.012, 0.03))
+    width, depth = draws.length("width", (0.42, 0.62)), draws.length("depth", (0.30, 0.48), (0.16, 0.62))
+    height, wall = draws.length("height", (0.23, 0.37), (0.2, 0.46)), draws.length("wall", (0.012, 0.03))
     thick = draws.length("door_thickness", (0.018, 0.045), (0.008, 0.045))
     foot = draws.length("foot_height", (0.006, 0.018))
     drops = draws.chance("door_drops", 0.15)  # the door falls open, its controls below or above it

@@ -125,8 +125,7 @@ def _shell(draws: Draws, mouse: _Mouse, dome: _Dome) -> None:
     """Body, buttons and what sits between them."""
     front, length = dome.front, dome.back - dome.front
     split = front + draws.number("button_length", (0.33, 0.62)) * length
-    floor = draws.number("button_bottom", (0.3, 0.55))
-    count = draws.pick("buttons", {1: 0.15, 2: 0.65, 3: 0.2})
+    floor, count = draws.number("button_bottom", (0.3, 0.55)), draws.pick("buttons", {1: 0.15, 2: 0.65, 3: 0.2})
     height = dome.at(split)[0]
     # The gap below the buttons, in shares of the height, leaves room for their travel.
     room = (0.0022 + GAP) / float(dome.heights[dome.stations <= split].min())

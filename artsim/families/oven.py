@@ -25,12 +25,10 @@ def build(draws: Draws) -> Assembly:
         return _cooktop(draws)
     built_in = draws.chance("built_in", 0.25)
     usual, widest = ((0.54, 0.62), (0.54, 0.76)) if built_in else ((0.48, 0.78), (0.44, 1.0))
-    half = 0.5 * draws.length("width", usual, widest)
-    depth = draws.length("depth", (0.5, 0.66), (0.42, 0.72))
+    half, depth = 0.5 * draws.length("width", usual, widest), draws.length("depth", (0.5, 0.66), (0.42, 0.72))
     height = draws.length("height", (0.44, 0.62) if built_in else (0.82, 0.95))
     two = not built_in and draws.pick("doors", {2: 0.2, 1: 0.8}) == 2
-    wall = draws.length("wall", (0.03, 0.05))
-    thick = draws.length("door_thickness", (0.03, 0.06), (0.022, 0.1))
+    wall, thick = draws.length("wall", (0.03, 0.05)), draws.length("door_thickness", (0.03, 0.06), (0.022, 0.1))
     plain = built_in or draws.pick("back", {"plain": 0.55, "guard": 0.45}) == "plain"
     guard = 0.0 if plain else draws.length("guard_height", (0.06, 0.2))
     on_guard = guard > 0.11 and draws.chance("knobs_on_guard", 0.6)
@@ -94,8 +92,7 @@ def _cooktop(draws: Draws) -> Assembly:
     half = 0.5 * draws.length("width", (0.28, 0.92))
     depth, height = draws.lengths(depth=(0.28, 0.56), height=(0.02, 0.12))
     strip = draws.length("strip_width", (0.06, 0.1))  # for the dials
-    beside = draws.chance("knobs_beside", 0.6)
-    side = draws.side("knob_side")
+    beside, side = draws.chance("knobs_beside", 0.6), draws.side("knob_side")
     front = 0.004
     body = _hob(draws, half, depth, height, front, 0.008) + box((-front, depth), half, (0, height), fillet=0.008)
     level = height + 0.008
@@ -186,8 +183,7 @@ def _door(draws: Draws, low: Array, high: Array, kind: str, reach: float) -> tup
 def _hinge(draws: Draws, low: Array, high: Array, sideways: bool, grip: float, reach: float) -> JointSpec:
     """Hinge at the side, or along the lower front edge; its handle must not sink by ``reach`` onto a door below."""
     if sideways:
-        left = draws.chance("hinge_left", 0.5)
-        upper = draws.turn("door_angle", (85.0, 130.0))
+        left, upper = draws.chance("hinge_left", 0.5), draws.turn("door_angle", (85.0, 130.0))
         return side_hinge(0.0, high[1] if left else low[1], upper, left)
     level = draws.chance("door_opens_level", 0.7)
     upper = np.deg2rad(90.0 if level else draws.degrees("door_angle", (75.0, 90.0)))
@@ -212,8 +208,7 @@ def _drawer(
 
 def _controls(draws: Draws, oven: Assembly, half: float, face: float, z: float, room: float) -> None:
     """A row of dials, perhaps in two groups, and perhaps buttons between them."""
-    count = draws.integer("knobs", 2, 7)
-    reach = draws.length("knob_reach", (0.018, 0.035), (0.01, 0.055))
+    count, reach = draws.integer("knobs", 2, 7), draws.length("knob_reach", (0.018, 0.035), (0.01, 0.055))
     stops = draws.chance("knob_stops", 0.35)
     end = draws.number("knob_row", (0.85, 0.85), (0.85, 1.2), tails=0.3)  # its length, with a gap before it
     ys = np.linspace(-end, end, count + 2)[1:-1] * half

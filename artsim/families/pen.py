@@ -48,8 +48,7 @@ class _Section:
 
 def build(draws: Draws) -> Assembly:
     """A pen; its long axis is upright. Half of those with a cap stand on their end."""
-    length = draws.log_length("length", 0.127, -0.6, 0.5)
-    slim = draws.chance("slim", 0.3)
+    length, slim = draws.log_length("length", 0.127, -0.6, 0.5), draws.chance("slim", 0.3)
     radius = length * draws.number("width", (0.02, 0.045) if slim else (0.045, 0.14))
     kind = draws.pick("kind", {"cap": 0.42, "button": 0.27, "twist": 0.13, "sliders": 0.09, "double": 0.09})
     turning = kind == "twist" or (kind == "cap" and draws.chance("cap_screws", 0.3))
@@ -112,8 +111,7 @@ def _clip(draws: Draws, section: _Section, radius: float, top: float, length: fl
 def _capped(draws: Draws, section: _Section, length: float, radius: float, turning: bool) -> Assembly:
     """A body with a cap over its tip, which slides off or unscrews."""
     covered = length * draws.number("cap_length", (0.18, 0.6))
-    wall = radius * draws.number("cap_wall", (0.1, 0.18))
-    flush = draws.chance("cap_flush", 0.5)
+    wall, flush = radius * draws.number("cap_wall", (0.1, 0.18)), draws.chance("cap_flush", 0.5)
     outer = radius * (1.0 if flush else draws.number("cap_width", (1.04, 1.25)))
     inner = outer - wall
     neck = inner - GAP - 0.02 * radius
@@ -138,8 +136,7 @@ def _capped(draws: Draws, section: _Section, length: float, radius: float, turni
     if draws.chance("cap_band", 0.3):  # around the mouth
         band = max(outer, widest) * 1.08
         cap += section.sleeve(inner, [(band, covered - GAP - 0.4 * radius), (band, covered - GAP)])
-    travel = covered * draws.number("cap_travel", (1.0, 1.3)) + radius
-    over = draws.chance("upside_down", 0.5)
+    travel, over = covered * draws.number("cap_travel", (1.0, 1.3)) + radius, draws.chance("upside_down", 0.5)
 
     def place(solid: Solid) -> Solid:
         return solid.turned((1, 0, 0), np.pi) if over else solid
@@ -193,8 +190,7 @@ def _clicked(draws: Draws, section: _Section, length: float, radius: float) -> A
             shell += section.rod([(at, z), (at, z + 0.25 * radius)])
     out = radius * draws.number("button_length", (0.8, 2.6))
     travel = out * draws.number("button_travel", (0.35, 0.8))
-    push = radius * draws.number("button_width", (0.35, 0.85))
-    wide = draws.chance("button_disc", 0.25)
+    push, wide = radius * draws.number("button_width", (0.35, 0.85)), draws.chance("button_disc", 0.25)
     collar = draws.number("collar_length", (0.3, 1.5)) * radius
     shell += _clip(draws, section, radius, length, length * draws.number("clip_length", (0.2, 0.45)))
     rim = radius * draws.number("collar_width", (0.85, 1.0))

@@ -80,8 +80,7 @@ def _aerial(draws: Draws, phone: Assembly, half: float, x: float, length: float,
     """A rod along one side that swings up about its upper end, on some."""
     if not draws.chance("antenna", 0.45, upper=True):
         return
-    radius = min(draws.length("antenna_radius", (0.0015, 0.004)), 0.4 * thick)
-    side = draws.side("antenna_side")
+    radius, side = min(draws.length("antenna_radius", (0.0015, 0.004)), 0.4 * thick), draws.side("antenna_side")
     y, z = side * (half + radius + 0.002), 0.93 * length  # clear of keys on the edge
     stalk = rod(x, y, (z, z - length * draws.number("antenna_length", (0.4, 0.85))), radius, sections=12)
     stalk += rod(x, (y - side * radius, y + 0.5 * side * radius), z, 1.4 * radius, sections=14)
@@ -263,8 +262,7 @@ def _cordless(draws: Draws, phone: Assembly) -> None:
     upright = (start + 0.68 * length, start + 0.9 * length)
     body += box((-0.5 * thick - 0.0005, 0.0), inner, upright).called("display", FRONT)
     if draws.chance("stub", 0.4):  # of an antenna
-        y = 0.6 * draws.side("stub_side") * half
-        top = start + length * draws.number("stub_top", (1.08, 1.4))
+        y, top = 0.6 * draws.side("stub_side") * half, start + length * draws.number("stub_top", (1.08, 1.4))
         body += rod(0, y, (start + 0.9 * length, top), 0.25 * thick, 0.18 * thick, 12)
     lift = prismatic("dock", (0, 0, 1), 0.0, draws.length("handset_travel", (0.4, 1.2), of=length), (0, 0, start))
     phone.add("handset", body, lift, density=900.0)

@@ -179,8 +179,7 @@ def _keys(draws: Draws, printer: Assembly, parent: str, front: float, half: floa
         return
     rows = draws.integer("key_rows", 1, 3) if rise > 0.035 else 1
     pitch = min(0.85 * rise / rows, 0.03)
-    columns = draws.integer("key_columns", 1, 5)
-    travel = draws.length("key_travel", (0.0008, 0.0015))
+    columns, travel = draws.integer("key_columns", 1, 5), draws.length("key_travel", (0.0008, 0.0015))
     outline = key_outline(draws.pick("key_shape", ["round", "square", "pill"]), (0.68 * pitch, 0.6 * pitch), 10)
     sides = [-1.0, 1.0] if draws.chance("keys_on_both_sides", 0.3) else [draws.side("keys_side")]
     columns = min(columns, int(0.6 * half / pitch), 12 // (rows * len(sides)))

@@ -19,8 +19,7 @@ def unusual_sides(
     sides = ["depth", "width", "height"]
     axis = sides.index(draws.pick("unusual_side", sides))
     b, c = (k for k in range(3) if k != axis)
-    near = draws.number("near_end", (0.0, 0.2))
-    small = draws.chance("unusually_small", 0.5)
+    near, small = draws.number("near_end", (0.0, 0.2)), draws.chance("unusually_small", 0.5)
     value = low[axis] * (1.0 + near) if small else high[axis] - near * (1.0 - high[axis])
     rest = float(np.sqrt(1.0 - value * value))
     # Angle of the other two sides in their plane.

@@ -42,10 +42,8 @@ class _Chain:
         self.along: Array = np.array([0.0, 0.0, 1.0])
         self.lateral: Array = np.array([0.0, 1.0, 0.0])
         self.links = [Link("base")]
-        self.collars = draws.chance("collars", 0.6)
-        self.square = draws.chance("square", 0.35)
-        self.side = draws.side("side")
-        self.same_side = draws.chance("same_side", 0.5)
+        self.collars, self.square = draws.chance("collars", 0.6), draws.chance("square", 0.35)
+        self.side, self.same_side = draws.side("side"), draws.chance("same_side", 0.5)
 
     @property
     def link(self) -> Link:
@@ -185,8 +183,7 @@ def _base(chain: _Chain, reach: float) -> None:
         _rail(chain, reach)
     link = chain.link
     floor = chain.at.copy()
-    height = r * draws.number("base_height", (1.0, 3.5))
-    wide = r * draws.number("base_width", (1.15, 1.7))
+    height, wide = r * draws.number("base_height", (1.0, 3.5)), r * draws.number("base_width", (1.15, 1.7))
     thick = 0.25 * r
     if draws.chance("round_base", 0.5):
         link.rod(floor, floor + (0, 0, thick), wide)

@@ -78,9 +78,8 @@ def build(draws: Draws) -> Assembly:
     rests = not plastic and draws.chance("finger_rest", 0.3)
     rest = draws.number("finger_rest_length", (0.15, 0.3)) * reach if rests else 0.0
     pivot = width * draws.number("pivot_radius", (0.22, 0.38))
-    button = sheet * draws.number("pivot_height", (0.4, 1.0))
+    button, opening = sheet * draws.number("pivot_height", (0.4, 1.0)), draws.turn("blade_angle", (45.0, 100.0))
 
-    opening = draws.turn("blade_angle", (45.0, 100.0))
     middle = sheet + GAP / 2
     blades = []
     for k in range(2):

@@ -136,8 +136,7 @@ def _arm(draws: Draws, lay: Layout, width: float) -> Solid:
         "tapered": (1.0, 1.05, 0.95, 0.6, 0.25, 0.15, 0.1),  # low at the hinge: turns over to lie behind
     }[kind]
     top = low + np.maximum(tall * np.array(heights), 0.004)
-    waist = draws.number("waist", (0.75, 1.0))
-    nose = 0.5 * width * draws.number("nose", (0.8, 1.0))
+    waist, nose = draws.number("waist", (0.75, 1.0)), 0.5 * width * draws.number("nose", (0.8, 1.0))
     plan = np.maximum([nose, 0.5 * width, 0.5 * width, 0.5 * waist * width, 0, 0, 0], narrow)
     plan[-1] = 0.9 * narrow
     bevel = draws.number("bevel", (0.15, 0.6))

@@ -33,8 +33,7 @@ def _shells(draws: Draws, x: float, y: float, low: float, high: float, seam: flo
         edge = [(0.0, bevel), (0.3 * bevel / depth, 0.3 * bevel), (bevel / depth, 0.0), (1.0, 0.0)]
         low_x, high_x = (-x, seam - GAP / 2) if side > 0 else (seam + GAP / 2, x)
         halves.append(rounded_tray((low_x, -y, low), (high_x, y, high), 0.003, radius, edge, axis=0, side=side))
-    count = draws.pick("ribs", [0, 0, 3, 5, 7])
-    upright = draws.chance("upright_ribs", 0.6)
+    count, upright = draws.pick("ribs", [0, 0, 3, 5, 7]), draws.chance("upright_ribs", 0.6)
     room = bevel + 0.02
     for k in range(count):
         share = (k + 0.5) / count

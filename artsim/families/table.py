@@ -116,8 +116,7 @@ def _pedestals(draws: Draws, table: Assembly) -> None:
     table.body += table_top(draws, depth, width, top, height)
     style = _style(draws)
     broad = min(draws.length("pedestal_width", (0.26, 0.5), (0.1, 0.6), tails=0.4), 0.38 * width)
-    sides = draws.one_of("pedestals", PEDESTALS, (0.3, 0.3, 0.4))
-    rolling = draws.chance("rolling", 0.1)
+    sides, rolling = draws.one_of("pedestals", PEDESTALS, (0.3, 0.3, 0.4)), draws.chance("rolling", 0.1)
     on_legs = not rolling and draws.chance("on_legs", 0.35)
     size = draws.length("leg_width", (0.03, 0.06))
     outer = y - (size if on_legs else 0.0)
@@ -214,8 +213,7 @@ def _column(draws: Draws, table: Assembly) -> None:
         sections = ((0.96, z), (1.0, z + 0.3 * thick), (1.0, z + 0.8 * thick), (0.98, z + thick))
         return loft([lifted(share * outline, level) for share, level in sections])
 
-    radius = draws.length("column_radius", (0.022, 0.06))
-    feet = draws.pick("feet", [0, 3, 4, 5])
+    radius, feet = draws.length("column_radius", (0.022, 0.06)), draws.pick("feet", [0, 3, 4, 5])
     rolling = feet > 2 and draws.chance("rolling", 0.4)
     foot = 0.06 if rolling else 0.0
     span = wide * draws.number("foot_reach", (0.55, 0.9))

@@ -72,8 +72,7 @@ def _rim(outer: tuple[Array, Array], inner: tuple[Array, Array], first: int = 0,
 
 def _bowl(draws: Draws, length: float, width: float, height: float, power: float, back: float, hung: bool) -> Solid:
     """Hollow bowl on a foot, with a deck behind it that carries the hinges."""
-    wall = draws.length("bowl_wall", (0.03, 0.05))
-    low = height * draws.number("bowl_depth", (0.35, 0.5))
+    wall, low = draws.length("bowl_wall", (0.03, 0.05)), height * draws.number("bowl_depth", (0.35, 0.5))
     narrow = draws.number("bowl_taper", (0.5, 0.75))
     levels = [(low, narrow), (0.5 * (low + height), 0.5 * (1.0 + narrow) + 0.06), (height, 1.0)]
     solid = Solid()
@@ -93,8 +92,7 @@ def _bowl(draws: Draws, length: float, width: float, height: float, power: float
     )
     if hung:
         return solid
-    kind = draws.pick("foot", ["pedestal", "skirt", "box"])
-    foot = draws.number("foot_length", (0.5, 0.85))
+    kind, foot = draws.pick("foot", ["pedestal", "skirt", "box"]), draws.number("foot_length", (0.5, 0.85))
     if kind == "pedestal":
         waist = draws.number("waist", (0.35, 0.5))
         rings = [
@@ -155,8 +153,7 @@ def _low_cistern(draws: Draws, moving: list[Moving], back: float, width: float, 
         joint = prismatic("cistern_lid" if lifts else "body", (0, 0, -1), 0.0, 0.006, button.bounds().mean(axis=0))
         moving.append((f"button_{number}", button, joint))
     if not buttons:
-        hand = draws.side("lever_side")
-        level = top - draws.length("lever_drop", (0.03, 0.08))
+        hand, level = draws.side("lever_side"), top - draws.length("lever_drop", (0.03, 0.08))
         if flush == "lever":
             inset = draws.length("lever_inset", (0.05, 0.08))
             moving.append(_lever(draws, (start, hand * (half - inset), level), FRONT, (0.0, -hand, 0.0)))
@@ -199,8 +196,7 @@ def _button_lid(draws: Draws, low: Point, high: Point, x: float, count: int) -> 
 
 def _high_cistern(draws: Draws, moving: list[Moving], back: float, height: float) -> Solid:
     """Up on a pipe, with a chain to pull."""
-    up = draws.length("pipe_length", (0.6, 1.3))
-    half = 0.5 * draws.length("cistern_width", (0.34, 0.52))
+    up, half = draws.length("pipe_length", (0.6, 1.3)), 0.5 * draws.length("cistern_width", (0.34, 0.52))
     deep, tall = draws.lengths(cistern_depth=(0.15, 0.2), cistern_height=(0.2, 0.32))
     x = back + 0.05
     solid = tube([(back - 0.03, 0, height - 0.06), (x, 0, height - 0.04), (x, 0, height + up + 0.01)], 0.02, 14)

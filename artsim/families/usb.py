@@ -176,8 +176,7 @@ def _swivel(draws: Draws, usb: Assembly, stick: _Stick) -> None:
     behind = back + (1.5 if eyelet.pieces else 0.0) * half
     corners = np.array([(-stick.reach, stick.plug[0]), (0.0, half), (behind, half)])
     reach = float(np.sqrt(np.square(corners - (pivot, 0.0)).sum(axis=1)).max()) + GAP
-    tail = half * draws.number("cover_tail", (0.5, 1.0))
-    wide = half * draws.number("cover_width", (0.7, 1.1))
+    tail, wide = half * draws.number("cover_tail", (0.5, 1.0)), half * draws.number("cover_width", (0.7, 1.1))
     end = key_outline("round", (2.0 * tail, 2.0 * wide), 16) + (pivot, 0.0)
     outline = np.concatenate([end[end[:, 0] > pivot], [(pivot - reach - sheet, -wide), (pivot - reach - sheet, wide)]])
     cover = prism(outline, low - sheet, low) + prism(outline, high, high + sheet)

@@ -20,16 +20,13 @@ FLANGE = 1.9
 
 def build(draws: Draws) -> Assembly:
     """Valves on a pipe along Y, with their stems up or towards the front; all are shut at rest."""
-    pipe = 0.5 * draws.length("diameter", (0.04, 0.1))
-    count = draws.pick("valves", {1: 0.7, 2: 0.2, 3: 0.1})
-    lever = draws.chance("lever", 0.3)
-    spacing = draws.length("spacing", (5.5, 7.5), of=pipe)
+    pipe, count = 0.5 * draws.length("diameter", (0.04, 0.1)), draws.pick("valves", {1: 0.7, 2: 0.2, 3: 0.1})
+    lever, spacing = draws.chance("lever", 0.3), draws.length("spacing", (5.5, 7.5), of=pipe)
     room = 0.47 * spacing if count > 1 else np.inf
     half = 0.5 * count * spacing * (1.0 if count > 1 else draws.number("pipe_length", (0.55, 0.9)))
     valve = Assembly("body", tube([(0, -half, 0), (0, half, 0)], pipe, 24) + _ends(draws, half, pipe), IRON)
     alike = draws.fork("", [draws.seed("valve_seed") // 2, draws.seed("more_seed") // 2])
-    rises = draws.chance("wheel_rises", 0.75)
-    axis = draws.one_of("wheel_axis", {"down": -UP, "up": UP})
+    rises, axis = draws.chance("wheel_rises", 0.75), draws.one_of("wheel_axis", {"down": -UP, "up": UP})
     fixed, moving, top, travel = (_ball_valve if lever else _gate_valve)(alike, pipe, room)
     for k in range(count):
         y = (k - 0.5 * (count - 1)) * spacing
@@ -98,8 +95,7 @@ def _gate_valve(draws: Draws, pipe: float, room: float) -> tuple[Solid, Solid, f
 
 def _wheel(draws: Draws, hub: float, radius: float, stem: float, pipe: float) -> Solid:
     """Handwheel: a rim, spokes (dished by chance) and a hub with a nut."""
-    rim = draws.length("rim_radius", (0.07, 0.12), of=radius)
-    spokes = draws.integer("spokes", 3, 6)
+    rim, spokes = draws.length("rim_radius", (0.07, 0.12), of=radius), draws.integer("spokes", 3, 6)
     level = hub + rim + draws.length("wheel_dish", (0.0, 0.25), of=radius)
     tall = 0.35 * pipe
     solid = tube(circle((0, 0, level), UP, radius - rim, 18), rim, 8, closed=True)

@@ -69,15 +69,13 @@ def _front_loader(draws: Draws, s: Shape) -> Assembly:
     if draws.chance("plinth", 0.5):  # and the flap of the filter
         body += box((0.012, s.depth - 0.01), s.half - 0.005, (0.0, s.low + 0.002))
         body += box((-0.0025, 0.01), (s.half - 0.2, s.half - 0.05), (s.low + 0.03, s.low + 0.12), fillet=0.004, axis=0)
-    turning = draws.chance("drum", 0.6)
-    bowl = draws.length("bowl_depth", (0.03, 0.06))
+    turning, bowl = draws.chance("drum", 0.6), draws.length("bowl_depth", (0.03, 0.06))
     tub = _drum(s, z, drum, hole, plate, bowl if turning else -plate / 2)
     machine = Assembly()
     machine.record(handles=True)
     machine.add("body", body if turning else body + tub, density=350.0)
 
-    outer = hole + draws.length("door_rim", (0.03, 0.055))
-    thick = draws.length("door_thickness", (0.025, 0.05))
+    outer, thick = hole + draws.length("door_rim", (0.03, 0.055)), draws.length("door_thickness", (0.025, 0.05))
     door = _porthole(draws, z, hole, outer, thick, bowl)
     hinge = side_hinge(-GAP - thick, sign * (outer + 0.012), draws.turn("door_angle", (95.0, 160.0)), left)
     machine.add("door", door if left else door.mirrored(1), hinge)
@@ -117,8 +115,7 @@ def _drum(s: Shape, z: float, radius: float, hole: float, plate: float, gap: flo
 def _porthole(draws: Draws, z: float, hole: float, outer: float, thick: float, bowl: float) -> Solid:
     """Door with its hinge at +Y; the glass reaches into the hole."""
     x0, x1 = -GAP - thick, -GAP
-    glass = hole * draws.number("glass_radius", (0.72, 0.9))
-    blind = draws.chance("door_blind", 0.15)
+    glass, blind = hole * draws.number("glass_radius", (0.72, 0.9)), draws.chance("door_blind", 0.15)
     if draws.pick("door_shape", {"round": 0.75, "square": 0.25}) == "round":
         solid = ring((0.5 * (x0 + x1), 0, z), (1, 0, 0), 0.97 * glass, outer, thick, 22)
         if draws.chance("door_bead", 0.5):

@@ -171,8 +171,7 @@ def _sliding(
 def _hung(draws: Draws, window: Assembly, width: float, height: float, depth: float, style: _Style) -> None:
     """A lower sash in front that slides up, and an upper one behind it that slides down or is fixed."""
     rail = style.rail
-    both = draws.chance("both_slide", 0.6)
-    meet = draws.length("meeting_rail", (0.45, 0.55), of=height)
+    both, meet = draws.chance("both_slide", 0.6), draws.length("meeting_rail", (0.45, 0.55), of=height)
     solids = []
     for track, (first, last) in enumerate(((GAP, meet + rail / 2), (meet - rail / 2, height - GAP))):
         x = -depth / 2 + 0.006 + track * (style.thick + GAP)
