@@ -134,9 +134,8 @@ def _bail(draws: Draws, half: float, reach: float, pivot: float, pin: float, wir
         angles = np.linspace(0.0, np.pi, 17)
         cosine, sine = cos(angles), sin(angles)
         bend = draws.one_of("bail", {"circle": 0.95, "squarish": draws.number("bail_bend", (0.5, 0.95))})
-        path = np.column_stack(
-            [np.zeros(17), half * np.sign(cosine) * power(np.abs(cosine), bend), pivot + height * power(sine, bend)]
-        )
+        across = half * np.sign(cosine) * power(np.abs(cosine), bend)
+        path = np.column_stack([np.zeros(17), across, pivot + height * power(sine, bend)])
     else:
         straight, flat = 0.55 * height, draws.number("bail_top", (0.4, 0.8))
         side = [(0.0, half, pivot), (0.0, half, pivot + straight), (0.0, flat * half, pivot + height)]

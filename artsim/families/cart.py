@@ -12,7 +12,7 @@ from artsim.families.shopping_carts import shopping_cart
 from artsim.families.wagons import hand_cart, wagon
 from artsim.families.wheels import GAP, STEEL, Wheels, bar, slab
 from artsim.making.assembly import Assembly, prismatic, revolute
-from artsim.making.draws import Draws
+from artsim.making.draws import Draws, Interval
 from artsim.making.outlines import FRONT, SIDE, UP, about, arch
 from artsim.making.solids import Solid, box, posts, rod, tray, tube, union
 
@@ -151,7 +151,7 @@ def _service_trolley(draws: Draws) -> Assembly:
             if row < rows - 1:
                 body += box((-depth, depth - 0.5 * wall), half - 0.5 * wall, (z1 + 0.0005, z1 + 0.0035))
             if doors and row == rows - 1:
-                _add_doors(draws, cart, depth, half, z0, z1, face, kind)
+                _add_doors(draws, cart, depth, half, (z0, z1), face, kind)
                 continue
             inner = half - wall - 0.003
             drawer = box((-depth - face, -depth - GAP), half - 0.002, (z0, z1))
@@ -188,9 +188,7 @@ def _service_trolley(draws: Draws) -> Assembly:
     return cart
 
 
-def _add_doors(
-    draws: Draws, cart: Assembly, depth: float, half: float, z0: float, z1: float, face: float, kind: str
-) -> None:
+def _add_doors(draws: Draws, cart: Assembly, depth: float, half: float, z: Interval, face: float, kind: str) -> None:
     """One or two doors before a compartment."""
     leaves = [(0.001, half - 0.002, True), (-half + 0.002, -0.001, False)]
     if not draws.chance("double_doors", 0.6):
@@ -198,9 +196,9 @@ def _add_doors(
     x = -depth - face
     limit = draws.angle("door_angle", (1.2, 1.9))
     for y0, y1, left in leaves:
-        leaf = box((x, -depth - GAP), (y0, y1), (z0, z1))
+        leaf = box((x, -depth - GAP), (y0, y1), z)
         y = y0 + 0.03 if left else y1 - 0.03
-        middle, span = 0.5 * (z0 + z1), 0.2 * (z1 - z0)
+        middle, span = 0.5 * (z[0] + z[1]), 0.2 * (z[1] - z[0])
         leaf += front_handle(kind, (x, y, middle - span), (x, y, middle + span), 0.03, 0.005)
         cart.add_numbered("door", leaf, side_hinge(x, y1 if left else y0, limit, left))
 

@@ -5,7 +5,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.details import side_hinge
 from artsim.making.assembly import Assembly, JointSpec, continuous, revolute
-from artsim.making.draws import Draws
+from artsim.making.draws import Draws, Interval
 from artsim.making.outlines import FRONT, Array, about, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, frame, hull, hull_of, prism, revolved, rod, union
 
@@ -112,9 +112,7 @@ def pendulum(draws: Draws, x: float, top: float, length: float, room: float) -> 
     return solid, revolute("body", FRONT, (x, 0, top), -swing, swing)
 
 
-def glass_door(
-    draws: Draws, clock: Assembly, x: float, across: tuple[float, float], upright: tuple[float, float]
-) -> None:
+def glass_door(draws: Draws, clock: Assembly, x: float, across: Interval, upright: Interval) -> None:
     """A frame before an opening at ``x``, hinged at its left or right."""
     draws = draws.within("door")
     thick = draws.length("thickness", (0.006, 0.012))

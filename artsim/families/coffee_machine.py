@@ -9,7 +9,7 @@ import numpy as np
 from artsim.common.elementary import power
 from artsim.families.details import dial
 from artsim.making.assembly import Assembly, continuous, prismatic, revolute
-from artsim.making.draws import Draws
+from artsim.making.draws import Draws, Interval
 from artsim.making.outlines import FRONT, UP, about, lifted, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, deferred, hull, hull_of, ring, rod, tray, tube, union, vessel
 
@@ -200,9 +200,7 @@ def _percolator(draws: Draws) -> Assembly:
 
 
 @deferred
-def _tapered(
-    low: tuple[float, float], high: tuple[float, float], heights: tuple[float, float], radius: float, shrink: float
-) -> Solid:
+def _tapered(low: Interval, high: Interval, heights: Interval, radius: float, shrink: float) -> Solid:
     """Block with round upright edges whose two sides lean inward."""
     outlines = [
         lifted(rounded_rectangle((low[0], low[1] + s), (high[0], high[1] - s), radius, 4), z)

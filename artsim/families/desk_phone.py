@@ -21,10 +21,8 @@ def desk_set(draws: Draws, phone: Assembly) -> None:
     reach = depth - inset  # of the deck
     slope = unit((reach, 0.0, back - front))
     corners = [(x, y) for x in (-0.5 * depth, 0.5 * depth) for y in (-0.5 * width, 0.5 * width)]
-    upper = [
-        (x * (1 - inset / depth), y * (1 - inset / width), front + (x / depth + 0.5) * (back - front))
-        for x, y in corners
-    ]
+    deeper, wider = 1 - inset / depth, 1 - inset / width
+    upper = [(x * deeper, y * wider, front + (x / depth + 0.5) * (back - front)) for x, y in corners]
     base = hull([(x, y, z) for x, y in corners for z in (0.0, 0.3 * front)] + upper)
     across, grip = draws.chance("handset_at_back", 0.4), draws.length("handset_width", (0.018, 0.03))
     deck = Face(np.array([-0.5 * reach, 0.0, front]), np.array([0.0, -1.0, 0.0]), slope)

@@ -14,12 +14,9 @@ from artsim.making.outlines import FRONT, Array, Span, Vector, ends, rounded_rec
 from artsim.making.solids import Solid, box, cylinder, deferred, frame, hull, hull_of, prism, rod, tube, union
 
 
-def drawn_from(
-    draws: Draws, name: str, spans: Mapping[str, Interval], chances: Mapping[str, float] | None = None
-) -> float:
+def drawn_from(draws: Draws, name: str, spans: Mapping[str, Interval], chances: Sequence[float] = ()) -> float:
     """A number from one of several ranges: all are drawn from (``corner_round``), and one is picked (``corner``)."""
-    values = {word: draws.number(f"{name}_{word}", span) for word, span in spans.items()}
-    return values[draws.pick(name, chances or list(spans))]
+    return draws.one_of(name, {word: draws.number(f"{name}_{word}", span) for word, span in spans.items()}, chances)
 
 
 @deferred
@@ -238,9 +235,8 @@ def push_button(face: Vector, size: Vector, round_off: float) -> Solid:
     """
     face = np.asarray(face, dtype=np.float64)
     half = np.array([0.0, 0.5 * size[0], 0.5 * size[1]])
-    return box(face - half - (0.008, 0, 0), face + half - (0.0022, 0, 0), fillet=round_off, axis=0).called(
-        "button", FRONT
-    )
+    button = box(face - half - (0.008, 0, 0), face + half - (0.0022, 0, 0), fillet=round_off, axis=0)
+    return button.called("button", FRONT)
 
 
 def add_push_button(machine: Assembly, number: int, face: Vector, size: Vector, round_off: float) -> None:

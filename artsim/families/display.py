@@ -177,17 +177,15 @@ def _column(draws: Draws, radius: float, low: float, high: float, free: bool) ->
     return hull([(x, y, z) for z, w in ends for x in (-radius, 2.0 * deep - radius) for y in (-w, w)])
 
 
-def _head(
-    plane: float, axis: float, y: float, z: float, ear: float, knuckle: float, panel: Panel, tilts: bool
-) -> Solid:
+def _head(plane: float, axis: float, y: float, z: float, ear: float, barrel: float, panel: Panel, tilts: bool) -> Solid:
     """What holds a screen: a plate behind it, and ears on either side of the hinge, or an arm where nothing tilts."""
-    size, upright = min(0.045, 0.5 * panel.rise), about(z, 0.8 * knuckle)
+    size, upright = min(0.045, 0.5 * panel.rise), about(z, 0.8 * barrel)
     solid = box((plane, plane + 0.006), about(y, 0.8 * size), about(z, size))
     if not tilts:
         return solid + box((plane, axis + 0.001), about(y, ear), upright)
     for s in (-1.0, 1.0):
         first, last = sorted((y + s * (ear + 0.001), y + s * (ear + 0.006)))
-        solid += rod(axis, (first, last), z, knuckle, sections=14) + box((plane, axis), (first, last), upright)
+        solid += rod(axis, (first, last), z, barrel, sections=14) + box((plane, axis), (first, last), upright)
     return solid
 
 
@@ -224,10 +222,8 @@ def _on_feet(draws: Draws, display: Assembly) -> None:
         y = s * spread
         solid = hull([(x + a * reach, y + b * wide, z) for a in (-1, 1) for b in (-1, 1) for z in (0.0, 0.006)])
         if draws.chance("foot_slopes", 0.5):
-            ends = ((0.8, 0.004), (0.3, foot))
-            solid += hull(
-                [(x + a * r * reach * 0.9, y + b * leg, z) for a in (-1, 1) for b in (-1, 1) for r, z in ends]
-            )
+            rim = ((0.8, 0.004), (0.3, foot))
+            solid += hull([(x + a * r * reach * 0.9, y + b * leg, z) for a in (-1, 1) for b in (-1, 1) for r, z in rim])
         else:
             solid += rod(x, y, (0.004, foot), leg, sections=14)
         display.add(f"foot_{k}", solid, revolute("body", (0, 0, s), (x, y, foot), 0.0, limit), density=2000.0)

@@ -102,19 +102,19 @@ def _frame(draws: Draws, width: float, height: float, depth: float, jamb: float,
     """Jambs and lintel with a stop behind the leaves; above or beside them perhaps a fixed light or an arch."""
     x0, x1, y = -depth / 2, depth / 2, width / 2
     threshold = 0.015 if draws.pick("threshold", [False, True]) else 0.0
-    solid = frame((x0, -y - jamb, -threshold), (x1, y + jamb, height + jamb), [jamb, jamb, threshold, jamb], 1, 2)
+    solid = frame((x0, -y - jamb, -threshold), (x1, y + jamb, height + jamb), [jamb, jamb, threshold, jamb])
     if kind != "sliding":
         stop = x0 + style.thickness + 0.003
         if stop + 0.012 < x1:
             bars = [0.014, 0.014, 0.0, 0.014]
-            solid += frame((stop, -y - 0.002, 0), (stop + 0.011, y + 0.002, height + 0.002), bars, 1, 2)
+            solid += frame((stop, -y - 0.002, 0), (stop + 0.011, y + 0.002, height + 0.002), bars)
     around = {"none": 0.27, "casing": 0.2, "fanlight": 0.12, "side light": 0.11, "arch": 0.1, "wall": 0.2}
     extra = draws.pick("surround", around)
     if extra == "casing":
         wide = draws.length("casing_width", (0.05, 0.1))
         for face in (x0 - 0.009, x1 - 0.002):
             solid += frame((face, -y - jamb - wide, 0), (face + 0.011, y + jamb + wide, height + jamb + wide),
-                           [wide + 0.002, wide + 0.002, 0, wide + 0.002], 1, 2)  # fmt: skip
+                           [wide + 0.002, wide + 0.002, 0, wide + 0.002])  # fmt: skip
     elif extra == "fanlight":
         rise = draws.length("fanlight_height", (0.25, 0.5))
         low, high = (x0, -y - jamb, height + jamb - 0.002), (x1, y + jamb, height + jamb + rise)
@@ -132,7 +132,7 @@ def _frame(draws: Draws, width: float, height: float, depth: float, jamb: float,
         left, right = draws.numbers("wall_side", 0.0 if beside < 4.0 else 0.7, 1.0, 2) * min(beside * width, 3.7) + 0.02
         above = draws.length("wall_above", (0.02, 0.6 if beside < 4.0 else 0.2))
         solid += frame((x0 + 0.004, -y - jamb - left, 0.0), (x1 - 0.003, y + jamb + right, height + jamb + above),
-                       [left + 0.002, right + 0.002, 0.0, above + 0.002], 1, 2)  # fmt: skip
+                       [left + 0.002, right + 0.002, 0.0, above + 0.002])  # fmt: skip
     elif extra == "arch":
         angles = np.linspace(0.0, np.pi, 17)
         radius, base = y + jamb, height + jamb - 0.002
@@ -199,15 +199,13 @@ def _leaf(
 
 def _escutcheon(draws: Draws, low: Array, high: Array, y: float, z: float, stile: float) -> Solid:
     """Roses or long plates around the hole for the handle, on both sides."""
+    faces = low[0], high[0]
     if draws.chance("roses", 0.5):
-        return union(ring((x, y, z), (1, 0, 0), 0.0115, 0.026, 0.012, 20) for x in (low[0], high[0]))
+        return union(ring((x, y, z), (1, 0, 0), 0.0115, 0.026, 0.012, 20) for x in faces)
     half = min(0.021, 0.4 * stile)
     below, above = draws.length("plate_below", (0.1, 0.17)), 0.06
     widths = [half - 0.0115, half - 0.0115, below - 0.0115, above - 0.0115]
-    return union(
-        frame((x - 0.006, y - half, z - below), (x + 0.006, y + half, z + above), widths, 1, 2)
-        for x in (low[0], high[0])
-    )
+    return union(frame((x - 0.006, y - half, z - below), (x + 0.006, y + half, z + above), widths) for x in faces)
 
 
 def _turning_handle(

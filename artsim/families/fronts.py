@@ -14,7 +14,7 @@ import numpy as np
 from artsim.families.details import front_handle, knob, panel, swing_limits
 from artsim.making.assembly import JointSpec, prismatic, revolute
 from artsim.making.draws import Draws
-from artsim.making.outlines import FRONT, Array, about
+from artsim.making.outlines import FRONT, Array, Vector, about
 from artsim.making.solids import Solid, box, cylinder, deferred, hull_of, tray, union
 
 GAP = 0.0015
@@ -239,9 +239,7 @@ def _leaf(draws: Draws, cell: Cell, style: Style, hinge: str, low: Array, high: 
 
 
 @deferred
-def _handle(
-    style: Style, foot: tuple[float, float, float] | Array, along: int, half: float, low: Array, high: Array
-) -> Solid:
+def _handle(style: Style, foot: Vector, along: int, half: float, low: Array, high: Array) -> Solid:
     """The style's handle on a front, centred on ``foot``, along axis 1 or 2 (Y or Z), ``2 * half`` long."""
     center = np.asarray(foot, dtype=np.float64)
     framed = style.panel in ("shaker", "planks") and (high[1:] - low[1:]).min() >= 3.2 * style.rail

@@ -43,10 +43,8 @@ def full_layout(draws: Draws) -> list[list[Cell]]:
     groups += [[last[middle]], last[:middle], last[middle + 1 :]]
     if draws.chance("function_keys", 0.6):
         top = rows + 1.0 + draws.number("function_keys_gap", (0.1, 0.5))
-        for k in range(3):
-            groups.append(
-                [(c + 0.5 + k * units / 3.0 + 0.2, top - 0.5, 1.0, 0.85) for c in range(int(units / 3.0 - 0.2))]
-            )
+        third = range(int(units / 3.0 - 0.2))
+        groups += [[(c + 0.5 + k * units / 3.0 + 0.2, top - 0.5, 1.0, 0.85) for c in third] for k in range(3)]
     right = units
     if draws.chance("cursor_block", 0.6):
         right += 0.3

@@ -4,7 +4,6 @@ What varies: the kind, of one body or of two halves; layout and caps of the keys
 body; feet that fold out, knobs, faders, wrist rests, cables.
 """
 
-from collections.abc import Iterable, Sequence
 from itertools import product
 
 import numpy as np
@@ -85,9 +84,7 @@ def build(draws: Draws) -> Assembly:
 # --- parts -----------------------------------------------------------------------------------------------------------
 
 
-def _add_keys(
-    keyboard: Assembly, decks: Iterable[tuple[str, Face]], groups: Sequence[Sequence[Cell]], caps: _Caps
-) -> None:
+def _add_keys(keyboard: Assembly, decks: list[tuple[str, Face]], groups: list[list[Cell]], caps: _Caps) -> None:
     """A part for each group of cells on each deck, a face of a part; the whole is centred on the face's origin."""
     cells = np.array([cell for group in groups for cell in group])
     low = (cells[:, :2] - 0.5 * cells[:, 2:]).min(axis=0)
@@ -168,14 +165,12 @@ def _trimmings(draws: Draws, face: Face, low: Array, high: Array, level: float) 
     return solid
 
 
-def _controls(
-    draws: Draws, keyboard: Assembly, face: Face, low: Array, high: Array, margin: float, keys_end: float
-) -> None:
+def _controls(draws: Draws, keyboard: Assembly, face: Face, low: Array, high: Array, margin: float, end: float) -> None:
     """Knobs, a roller or a fader on a wide strip behind the keys."""
     room = margin - 0.006
     if room < 0.008:
         return
-    v = keys_end + 0.002 + 0.5 * room
+    v = end + 0.002 + 0.5 * room
     span = high[0] - low[0] - room
     count = min(draws.integer("controls", 1, 3), int(span / (1.4 * room)))
     for k in range(count):

@@ -7,7 +7,7 @@ import numpy as np
 
 from artsim.common.elementary import cos, sin
 from artsim.making.assembly import Assembly, JointSpec, prismatic
-from artsim.making.draws import Draws
+from artsim.making.draws import Draws, Interval
 from artsim.making.outlines import Array, Vector, rounded_rectangle
 from artsim.making.solids import Solid, deferred, hull, prism, union
 
@@ -110,14 +110,10 @@ def add_buttons(
 def key_cells(u: Sequence[float], v: Sequence[float], columns: int, rows: int) -> Iterator[tuple[float, float]]:
     """Centre of each cell of a grid over a rectangle of limits u and v, from its upper left on, row by row."""
     wide, high = (u[1] - u[0]) / columns, (v[1] - v[0]) / rows
-    for row in range(rows):
-        for column in range(columns):
-            yield u[0] + (column + 0.5) * wide, v[1] - (row + 0.5) * high
+    return ((u[0] + (c + 0.5) * wide, v[1] - (r + 0.5) * high) for r in range(rows) for c in range(columns))
 
 
-def add_keypad(
-    draws: Draws, phone: Assembly, parent: str, face: Face, half: float, v: tuple[float, float], height: float
-) -> int:
+def add_keypad(draws: Draws, phone: Assembly, parent: str, face: Face, half: float, v: Interval, height: float) -> int:
     """Keys in three or four columns over a part of a face, function keys above them; returns the next free number."""
     kind = draws.pick("key_shape", ["square", "pill", "round"])
     columns, rows = 3, 4
@@ -137,9 +133,8 @@ def add_keypad(
 
 
 def add_function_keys(
-    draws: Draws, phone: Assembly, parent: str, face: Face, half: float, v: tuple[float, float], height: float,
-    number: int,
-) -> int:  # fmt: skip
+    draws: Draws, phone: Assembly, parent: str, face: Face, half: float, v: Interval, height: float, number: int
+) -> int:
     """Two keys with a larger one between them; returns the next free number."""
     deep, middle = v[1] - v[0], 0.5 * (v[0] + v[1])
     sizes = {"select_key": (min(0.8 * half, 1.4 * deep), 0.85 * deep), "function_key": (0.4 * half, 0.5 * deep)}

@@ -126,15 +126,13 @@ def _base(draws: Draws, link: Link, r: float) -> float:
     return thick + post
 
 
-def _arm(
-    link: Link, at: Array, along: Array, length: float, half: float, r: float, double: bool, sprung: bool
-) -> Array:
+def _arm(link: Link, at: Array, along: Array, length: float, half: float, r: float, twin: bool, sprung: bool) -> Array:
     """An arm from one knuckle on; returns where the next one is."""
     end = at + length * along
     link.solid += cylinder(at - half * SIDE, at + half * SIDE, r, sections=18)
     across = np.cross(SIDE, along)
     thin = 0.8 * half
-    if double:
+    if twin:
         link.solid += union(tube([at + s * r * across, end + s * r * across], 0.75 * thin, 10) for s in (-0.6, 0.6))
     else:
         link.solid += tube([at, end], thin, 12)

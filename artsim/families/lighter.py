@@ -169,9 +169,8 @@ def _long(draws: Draws) -> Assembly:
     guard, out = draws.chance("guard", 0.4), draws.length("trigger_reach", (0.004, 0.01))
     if guard:
         low, high = (-half_x - out - 0.008, 0, slot_low - 0.002), (-half_x - out - 0.01, 0, slot_high + 0.002)
-        body += tube(
-            [(-0.8 * half_x, 0, slot_low - 0.006), low, high, (-0.75 * half_x, 0, slot_high + 0.01)], 0.002, 10
-        )
+        bow = [(-0.8 * half_x, 0, slot_low - 0.006), low, high, (-0.75 * half_x, 0, slot_high + 0.01)]
+        body += tube(bow, 0.002, 10)
     radius = min(neck * half_x, neck * half_y, draws.length("nozzle_radius", (0.0035, 0.006)))
     lean = draws.one_of("nozzle", {"straight": 0.0, "bent": draws.angle("nozzle_bend", (0.0, 0.5))})
     mouth = [-0.7 * nozzle * sin(lean), 0, handle + (0.3 + 0.7 * cos(lean)) * nozzle]
@@ -235,9 +234,8 @@ def _table(draws: Draws) -> Assembly:
     thin = 0.0012
     if draws.chance("lid", 0.7):
         at = height + 0.0016
-        lighter.body += union(
-            box(about(hinge_x, 0.0012), about(s * 0.5 * wide, 0.0015), (height - 0.001, at - 0.0004)) for s in (-1, 1)
-        )
+        deep, upright = about(hinge_x, 0.0012), (height - 0.001, at - 0.0004)
+        lighter.body += union(box(deep, about(s * 0.5 * wide, 0.0015), upright) for s in (-1, 1))
         base = at + GAP
         flap = frame((split, -wide, base), (hinge_x - 0.0015, wide, base + flap_tall), [thin] * 4, 0, 1)
         flap += box((split, hinge_x - 0.0015), wide, (base + flap_tall - thin, base + flap_tall))

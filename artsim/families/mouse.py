@@ -12,7 +12,7 @@ from artsim.common.products import apply
 from artsim.families.details import holed_plate
 from artsim.families.keys import add_key, pill, side_face, top_face
 from artsim.making.assembly import Assembly, JointSpec, continuous, revolute
-from artsim.making.draws import Draws
+from artsim.making.draws import Draws, Interval
 from artsim.making.solids import Solid, cylinder, deferred, ellipsoid, hull, loft, rod, tube, union
 from artsim.model.kinematics import Array
 from artsim.model.transforms import rotation_about
@@ -52,9 +52,7 @@ class _Dome:
         rows = (self.heights, self.halves, self.shifts)
         return tuple(float(np.interp(x, self.stations, row)) for row in rows)  # type: ignore[return-value]
 
-    def cut(
-        self, x: float, y: tuple[float, float] = (-1.0, 1.0), low: float = 0.0, share: float = 1.0, drop: float = 0.0
-    ) -> Array:
+    def cut(self, x: float, y: Interval = (-1, 1), low: float = 0.0, share: float = 1.0, drop: float = 0.0) -> Array:
         """(N, 3) cross-section at x, clamped to a range of y and, in shares of the height there, of z.
 
         Its upper end is ``drop`` metres lower than that.

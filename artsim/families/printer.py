@@ -11,7 +11,7 @@ import numpy as np
 from artsim.families.details import drawn_from
 from artsim.families.keys import add_buttons, front_face, key_cells, key_outline, top_face
 from artsim.making.assembly import Assembly, prismatic, revolute
-from artsim.making.draws import Draws
+from artsim.making.draws import Draws, Interval
 from artsim.making.outlines import FRONT, Array, about, lifted, rounded_rectangle
 from artsim.making.solids import Solid, box, hull, posts, prism, rod, tray, union
 
@@ -40,9 +40,7 @@ class _Case:
     y: float  # half of the width
     outline: Array  # (N, 2) rounded rectangle of x and y
 
-    def block(
-        self, low: float, high: float, x: tuple[float, float] = (-9.0, 9.0), y: tuple[float, float] = (-9.0, 9.0)
-    ) -> Solid:
+    def block(self, low: float, high: float, x: Interval = (-9.0, 9.0), y: Interval = (-9.0, 9.0)) -> Solid:
         """The body between two heights, cut to a range of x and of y."""
         return prism(np.clip(self.outline, (x[0], y[0]), (x[1], y[1])), low, high)
 
@@ -77,9 +75,8 @@ def build(draws: Draws) -> Assembly:
         else:
             printer.body += case.block(low - 1e-4, high + 1e-4)
         printer.body += case.block(high, high + SHELF)
-        _fill(
-            draws.within("panel" if band == "tilting" else band), printer, -x, band, number, (low, tall), half, cavity
-        )
+        piece = draws.within("panel" if band == "tilting" else band)
+        _fill(piece, printer, -x, band, number, (low, tall), half, cavity)
     if slopes:
         printer.body += _slope(case, levels[-1], rise, side)
         if draws.chance("paper_stop", 0.7, upper=True):
@@ -119,9 +116,8 @@ def _feet(case: _Case, height: float, casters: bool) -> Solid:
 
 
 def _fill(
-    draws: Draws, printer: Assembly, front: float, kind: str, number: int, span: tuple[float, float], half: float,
-    cavity: float,
-) -> None:  # fmt: skip
+    draws: Draws, printer: Assembly, front: float, kind: str, number: int, span: Interval, half: float, cavity: float
+) -> None:
     """What moves in a band of the front, whose lower end and height are given."""
     low, tall = span
     high, wide = low + tall, half - GAP
@@ -229,9 +225,8 @@ def _lid(draws: Draws, printer: Assembly, case: _Case, kind: str, top: float) ->
     middle = outline.mean(axis=0)
     lid = prism(outline, seam, seam + 0.6 * thick)
     crown = seam + thick
-    lid += hull(
-        np.concatenate([lifted(outline, seam + 0.5 * thick), lifted(middle + shrink * (outline - middle), crown)])
-    )
+    crest = lifted(middle + shrink * (outline - middle), crown)
+    lid += hull(np.concatenate([lifted(outline, seam + 0.5 * thick), crest]))
     feeder = back == case.x and kind != "small" and draws.chance("feeder_tray", 0.6 if kind == "copier" else 0.35)
     if feeder:
         rise = draws.length("feeder_height", (0.03, 0.09))

@@ -1,16 +1,13 @@
 """Proportions far from the middle, which few objects of a family have: a flat draw would make most objects odd."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from artsim.common.elementary import arccos, arcsin, cos, sin
 from artsim.making.draws import Draws
+from artsim.making.outlines import Vector
 
 
-def unusual_sides(
-    draws: Draws, low: Sequence[float], high: Sequence[float], least: Sequence[float]
-) -> tuple[float, float, float]:
+def unusual_sides(draws: Draws, low: Vector, high: Vector, least: Vector) -> tuple[float, float, float]:
     """Depth, width and height of a box, metres, one of which is near the end of its range.
 
     ``low`` and ``high`` are the smallest and largest share of each side in the diagonal. The box is up to a third

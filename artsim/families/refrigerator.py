@@ -82,10 +82,9 @@ def build(draws: Draws) -> Assembly:
         solid = _door(draws, corner_low, corner_high, style, side, grip_at_top, broad)
         if dispenser and side > 0:
             y, z = 0.5 * (right + left), low + draws.number("dispenser_place", (0.45, 0.6)) * (high - low)
-            solid += frame(
-                (-style.thick - 0.008, y - 0.08, z - 0.14), (0.5 * -style.thick, y + 0.08, z + 0.14), [0.014] * 4
-            )
-            keys = box((-style.thick - 0.014, -0.5 * style.thick), about(y, 0.05), (z + 0.08, z + 0.13), fillet=0.004)
+            x0, x1 = -style.thick, -0.5 * style.thick
+            solid += frame((x0 - 0.008, y - 0.08, z - 0.14), (x1, y + 0.08, z + 0.14), [0.014] * 4)
+            keys = box((x0 - 0.014, x1), about(y, 0.05), (z + 0.08, z + 0.13), fillet=0.004)
             solid += keys.called("panel", FRONT)
         name = f"door_{doors}" if layout != "single" else "door"
         fridge.add(name, solid, side_hinge(0.0, left if side > 0 else right, opening, side > 0), density=200.0)
@@ -158,10 +157,9 @@ def _door(draws: Draws, low: Array, high: Array, style: Style, side: float, grip
 def _drawer(draws: Draws, low: Array, high: Array, depth: float, style: Style) -> Solid:
     """Freezer drawer: a front with a tray behind it."""
     solid = _front(draws, low, high, style)
-    half = high[1] - style.wall - 0.012
-    solid += tray(
-        (-0.003, -half, low[2] + style.wall + 0.008), (depth - style.wall - 0.02, half, high[2] - 0.08), 0.006
-    )
+    wall = style.wall
+    half = high[1] - wall - 0.012
+    solid += tray((-0.003, -half, low[2] + wall + 0.008), (depth - wall - 0.02, half, high[2] - 0.08), 0.006)
     span = half * draws.number("drawer_handle_length", (0.5, 0.95))
     z = high[2] - draws.length("drawer_handle_below_top", (0.05, 0.08))
     return solid + front_handle(style.handle, (low[0], -span, z), (low[0], span, z), style.reach, style.radius)

@@ -24,7 +24,7 @@ def draw_panel(draws: Draws, most: float = 0.95) -> Panel:
     """A panel at most so wide, metres."""
     width = draws.triangular("width", 0.22, 0.52, most, unit="m")
     formats = {"wide": (0.36, 0.48), "usual": (0.54, 0.68), "square": (0.72, 0.85)}
-    ratio = drawn_from(draws, "format", formats, {"wide": 0.2, "usual": 0.5, "square": 0.3})
+    ratio = drawn_from(draws, "format", formats, (0.2, 0.5, 0.3))
     thick = draws.triangular("thickness", 0.015, 0.05, 0.16, of=width, unit="m")
     bend = draws.length("bend", (0.03, 0.14), of=width) if ratio < 0.6 and draws.chance("bent", 0.4) else 0.0
     return Panel(0.5 * width, 0.5 * width * ratio, thick, bend)

@@ -154,24 +154,20 @@ def drop_leaves(draws: Draws, table: Assembly, depth: float, width: float, top: 
     for side in (-1, 1)[: draws.integer("leaves", 1, 2)]:
         near, far = side * (width / 2 + GAP), side * (width / 2 + GAP + long)
         leaf = box(depth / 2, (near, far), (top, height), fillet=0.2 * (height - top))
-        joint = revolute(
-            "body", (-side, 0, 0), (0.0, near, top), 0.0, np.pi / 2 * draws.number("leaf_angle", (0.9, 1.0))
-        )
-        table.add_numbered("leaf", leaf, joint)
+        limit = np.pi / 2 * draws.number("leaf_angle", (0.9, 1.0))
+        table.add_numbered("leaf", leaf, revolute("body", (-side, 0, 0), (0.0, near, top), 0.0, limit))
 
 
-def keyboard_tray(
-    draws: Draws, table: Assembly, front: float, near: float, far: float, top: float, deep: float
-) -> None:
+def keyboard_tray(draws: Draws, desk: Assembly, front: float, near: float, far: float, top: float, deep: float) -> None:
     """A board that slides out below the top between two rails."""
     half, middle = 0.5 * (far - near) * draws.number("tray_width", (0.6, 0.96)), 0.5 * (near + far)
     y0, y1 = middle - half, middle + half
     z = top - draws.length("tray_drop", (0.07, 0.12))
     for y in (y0 - 0.012, y1):
-        table.body += box((front + 0.01, front + deep), (y, y + 0.012), (z - 0.005, top + 0.001))
+        desk.body += box((front + 0.01, front + deep), (y, y + 0.012), (z - 0.005, top + 0.001))
     board = box((front + 0.005, front + deep), (y0 + GAP, y1 - GAP), (z, z + 0.018), fillet=0.004)
     joint = prismatic("body", (-1, 0, 0), 0.0, deep * draws.number("travel", (0.5, 0.85)), (front, middle, z))
-    table.add_numbered("drawer", board, joint)
+    desk.add_numbered("drawer", board, joint)
 
 
 def wheels(table: Assembly, spots: list[tuple[float, float]], height: float, size: float) -> None:

@@ -45,9 +45,8 @@ def build(draws: Draws) -> Assembly:
     toaster = Assembly()
     places = [-0.5 * half, 0.5 * half]
     if count < 4:
-        places = [
-            half * draws.one_of("lever_place", {"middle": 0.0, "aside": draws.number("lever_aside", (-0.35, 0.35))})
-        ]
+        aside = draws.number("lever_aside", (-0.35, 0.35))
+        places = [half * draws.one_of("lever_place", {"middle": 0.0, "aside": aside})]
     top = foot + height * draws.number("lever_height", (0.62, 0.78))
     travel = draws.number("lever_travel", (0.25, 1.0)) * min(0.11, top - foot - 0.055)
     if draws.chance("lever_guide", 0.8):
@@ -77,10 +76,8 @@ def _block(draws: Draws, shape: str, low: Array, high: Array, side: float) -> So
     if shape in ("arch", "loaf"):  # round edges along the slots, or over the ends
         axis = 0 if shape == "arch" else 1
         across = [1 - axis, 2]
-        radius = (
-            draws.number("arch_radius", (0.5, 0.95)) * side if axis == 0 else draws.length("loaf_radius", (0.03, 0.06))
-        )
-        outline = rounded_rectangle(low[across] - (0.0, 0.1), high[across], radius, 6 + axis)
+        r = draws.number("arch_radius", (0.5, 0.95)) * side if axis == 0 else draws.length("loaf_radius", (0.03, 0.06))
+        outline = rounded_rectangle(low[across] - (0.0, 0.1), high[across], r, 6 + axis)
         outline = np.stack([outline[:, 0], np.maximum(outline[:, 1], low[2])], axis=1)
         return prism(outline, low[axis], high[axis], axis)
     if shape == "block":  # wider below

@@ -226,7 +226,7 @@ def _wall(draws: Draws, moving: list[Moving], back: float, width: float, height:
     solid = box((back - 0.001, back + draws.length("panel_thickness", (0.06, 0.16))), half, (low, top))
     z = top - draws.length("plate_drop", (0.08, 0.14))
     wide, high = 0.5 * draws.length("plate_width", (0.18, 0.26)), 0.5 * draws.length("plate_height", (0.12, 0.18))
-    solid += frame((back - 0.012, -wide, z - high), (back, wide, z + high), [0.012] * 4, 1, 2)
+    solid += frame((back - 0.012, -wide, z - high), (back, wide, z + high), [0.012] * 4)
     count = draws.integer("buttons", 1, 2)
     inner = wide - 0.012 - GAP
     split = 0.0 if count == 1 else inner * draws.number("button_split", (-0.3, 0.3))

@@ -52,10 +52,9 @@ def _ends(draws: Draws, half: float, pipe: float) -> Solid:
             solid += cylinder(end, end + 0.9 * pipe * inward, 1.3 * pipe, sections=6)
             continue
         solid += cylinder(end, end + thick * inward, wide, sections=24)
+        head, tail = -0.12 * pipe * inward, (thick + 0.15 * pipe) * inward
         for spot in circle(end, inward, 0.5 * (wide + pipe), bolts):
-            solid += cylinder(
-                spot - 0.12 * pipe * inward, spot + (thick + 0.15 * pipe) * inward, 0.14 * pipe, sections=6
-            )
+            solid += cylinder(spot + head, spot + tail, 0.14 * pipe, sections=6)
     return solid
 
 

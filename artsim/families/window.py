@@ -17,7 +17,7 @@ GAP = 0.003
 PANE = 0.006
 
 
-class _Style:
+class Style:
     """What the sashes of a window share."""
 
     def __init__(self, draws: Draws, most: float) -> None:
@@ -42,14 +42,14 @@ def build(draws: Draws) -> Assembly:
     width = draws.length("width", (0.35, 1.0)) * (count if kind != "hung" else 1)  # drawn for one light
     height = draws.length("height", (0.5, 1.8)) if kind != "hung" else draws.length("height", (1.3, 2.0), of=width)
     bar, depth = draws.lengths(frame_width=(0.035, 0.065), depth=(0.05, 0.22))
-    style = _Style(draws, 1.0 if kind == "hinged" else 0.035)
+    style = Style(draws, 1.0 if kind == "hinged" else 0.035)
     if kind != "hinged":
         depth = max(depth, (count if kind == "sliding" else 2) * (style.thick + GAP) + 0.015)
     window = Assembly("frame", _frame(draws, width, height, depth, bar), 700.0)
     if kind == "hung":
         _hung(draws, window, width, height, depth, style)
     else:
-        {"hinged": _hinged, "sliding": _sliding}[kind](draws, window, width, height, depth, style, count)
+        {"hinged": _swing, "sliding": _slide}[kind](draws, window, width, height, depth, style, count)
     return window
 
 
@@ -72,9 +72,7 @@ def _frame(draws: Draws, width: float, height: float, depth: float, bar: float) 
     return solid
 
 
-def _hinged(
-    draws: Draws, window: Assembly, width: float, height: float, depth: float, style: _Style, count: int
-) -> None:
+def _swing(draws: Draws, window: Assembly, width: float, height: float, depth: float, style: Style, count: int) -> None:
     """Lights side by side between mullions; each hinged or fixed. Two may meet without a mullion between them."""
     x0 = -depth / 2
     mullion = draws.length("mullion_width", (0.03, 0.06))
@@ -114,7 +112,7 @@ def _hinged(
 
 
 def _leaf(
-    window: Assembly, name: str, hinge: str, low: Array, high: Array, style: _Style, limit: float, outer: bool,
+    window: Assembly, name: str, hinge: str, low: Array, high: Array, style: Style, limit: float, outer: bool,
     lever_turns: bool,
 ) -> None:  # fmt: skip
     """A hinged sash, mostly with a handle that turns on it, on the edge that opens."""
@@ -147,9 +145,7 @@ def _leaf(
     window.add(name.replace("sash", "handle"), lever, joint, label="handle", density=2500.0)
 
 
-def _sliding(
-    draws: Draws, window: Assembly, width: float, height: float, depth: float, style: _Style, count: int
-) -> None:
+def _slide(draws: Draws, window: Assembly, width: float, height: float, depth: float, style: Style, count: int) -> None:
     """Sashes on as many tracks; each may slide over all others."""
     rail, pitch = style.rail, width / count
     order = draws.rng.permutation(count)
@@ -168,7 +164,7 @@ def _sliding(
         window.add(f"sash_{k}", solid, joint, density=900.0)
 
 
-def _hung(draws: Draws, window: Assembly, width: float, height: float, depth: float, style: _Style) -> None:
+def _hung(draws: Draws, window: Assembly, width: float, height: float, depth: float, style: Style) -> None:
     """A lower sash in front that slides up, and an upper one behind it that slides down or is fixed."""
     rail = style.rail
     both, meet = draws.chance("both_slide", 0.6), draws.length("meeting_rail", (0.45, 0.55), of=height)
