@@ -57,9 +57,7 @@ def _body(draws: Draws, shape: str, wide: bool, tall: float) -> tuple[Solid, Mou
     kind = draws.pick("outline", kinds.get(shape, ["round", "round", "square", "square", "octagon", "hexagon"]))
     outline = cross_section(kind, draws.number("corner_sharpness", (0.0, 1.0)))
     half = 0.5 * draws.length("width", (0.044, 0.15))
-    depth = half
-    if kind != "round" or draws.chance("oval", 0.3):
-        depth = half * draws.number("depth", (0.4, 1.0))
+    depth = half * draws.number("depth", (0.4, 1.0)) if kind != "round" or draws.chance("oval", 0.3) else half
     if kind == "flask":
         depth = half * draws.number("flask_depth", (0.3, 0.6))
     slim = {"wine": (5.0, 8.5), "beer": (4.5, 7.0), "jar": (1.3, 3.2), "ball": (1.7, 2.4), "flask": (2.2, 4.0)}

@@ -4,18 +4,29 @@ What varies: the kind; the panel, one to three of them on a bar; the foot; which
 joints there are; keys, knobs and rabbit ears.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from artsim.common.elementary import arcsin, cos, hypot, sin
-from artsim.families.details import dial
+from artsim.families.details import dial, drawn_from
 from artsim.families.keys import Face, add_buttons, add_key, front_face, key_outline, pill, side_face
-from artsim.families.screens import Panel, draw_panel, screen
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
 from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, UP, Array, about, rounded_rectangle
 from artsim.making.solids import Solid, box, cylinder, frame, hull, loft, ring, rod, tube
 
 GAP = 0.0015
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A flat or bent screen about the origin, its back at x = 0."""
+
+    half: float  # of the width
+    rise: float  # half of the height
+    thick: float  # of the whole panel, before x = 0
+    bend: float  # how far the left and right edges come forward
 
 
 def build(draws: Draws) -> Assembly:
@@ -93,7 +104,7 @@ class _Chain:
 
 def _on_stand(draws: Draws, display: Assembly) -> None:
     """Screens on a column that turns, slides, tilts and turns to portrait, or some of these."""
-    panel = draw_panel(draws)
+    panel = _draw_panel(draws)
     count = draws.pick("screens", {1: 0.84, 2: 0.1, 3: 0.06}) if not panel.bend and panel.half < 0.3 else 1
     swivels, slides = draws.chance("neck", 0.5), draws.chance("slider", 0.45)
     tilts, pivots = draws.chance("tilts", 0.85), draws.chance("turns_to_portrait", 0.3)
@@ -192,7 +203,7 @@ def _head(plane: float, axis: float, y: float, z: float, ear: float, barrel: flo
 def _finish_screen(draws: Draws, chain: _Chain, panel: Panel, at: Array, number: int) -> None:
     """Add the panel to the chain's last part, finish that, and put keys on the first one."""
     chin = draws.number("chin", (0.0, 0.16)) * panel.rise * draws.pick("has_chin", {False: 0.4, True: 0.6})
-    chain.solid += screen(draws, panel, chin).moved(at)
+    chain.solid += _screen(draws, panel, chin).moved(at)
     name, size = chain.finish(), min(0.4 * panel.thick, 0.008)
     if number > 0:
         return
@@ -209,7 +220,7 @@ def _finish_screen(draws: Draws, chain: _Chain, panel: Panel, at: Array, number:
 
 def _on_feet(draws: Draws, display: Assembly) -> None:
     """A television set on two feet that fold in below it."""
-    panel = draw_panel(draws, 1.5)
+    panel = _draw_panel(draws, 1.5)
     foot = draws.length("foot_height", (0.02, 0.1))
     middle = foot + GAP + panel.rise
     _finish_screen(draws, _Chain(display, "body"), panel, np.array([0.0, 0.0, middle]), 0)
@@ -231,7 +242,7 @@ def _on_feet(draws: Draws, display: Assembly) -> None:
 
 def _on_easel(draws: Draws, display: Assembly) -> None:
     """A thin panel with a leaf or two legs on its back that fold out."""
-    panel = draw_panel(draws, 0.6)
+    panel = _draw_panel(draws, 0.6)
     _finish_screen(draws, _Chain(display, "body"), panel, np.array([0.0, 0.0, panel.rise]), 0)
     z = 2.0 * panel.rise * draws.number("prop_height", (0.3, 0.85))
     low, thick = 0.04 * panel.rise, draws.length("prop_thickness", (0.002, 0.008))
@@ -312,3 +323,47 @@ def _rabbit_ears(draws: Draws, display: Assembly, parent: str, foot: Array, half
         ear += cylinder(pivot - (0.007, 0, 0), pivot + (0.007, 0, 0), 0.008, sections=12)
         hinge = revolute(parent, (s, 0, 0), tuple(pivot), -draws.angle("antenna_angle", (0.3, 0.8)), lean * 0.8)
         display.add(f"antenna_{k}", ear, hinge, density=3000.0)
+
+
+def _draw_panel(draws: Draws, most: float = 0.95) -> Panel:
+    """A panel at most so wide, metres."""
+    width = draws.triangular("width", 0.22, 0.52, most, unit="m")
+    formats = {"wide": (0.36, 0.48), "usual": (0.54, 0.68), "square": (0.72, 0.85)}
+    ratio = drawn_from(draws, "format", formats, (0.2, 0.5, 0.3))
+    thick = draws.triangular("thickness", 0.015, 0.05, 0.16, of=width, unit="m")
+    bend = draws.length("bend", (0.03, 0.14), of=width) if ratio < 0.6 and draws.chance("bent", 0.4) else 0.0
+    return Panel(0.5 * width, 0.5 * width * ratio, thick, bend)
+
+
+def _screen(draws: Draws, panel: Panel, chin: float) -> Solid:
+    """The panel: a shell with a frame around the sunken screen, and a hump on its back."""
+    half, rise, thick = panel.half, panel.rise, panel.thick
+    rim = draws.number("rim", (0.008, 0.07)) * half + 0.002
+    lip = min(0.12 * thick, 0.004)  # how far the frame stands before the screen
+    # What the shell leaves of the thickness goes to the hump.
+    back = -thick * (draws.number("hump", (0.0, 0.65)) * draws.pick("humped", [False, True]))
+    solid = Solid()
+    if panel.bend:
+        edges = np.linspace(-half, half, 8)
+        forward = panel.bend * np.square(edges / half)
+        for k in range(7):
+            corners = list(zip(edges[k : k + 2], forward[k : k + 2], strict=True))
+            for x0, x1, z0, z1 in (
+                (lip - thick, back, -rise, rise),
+                (-thick, lip - thick + 0.0005, -rise, chin + rim - rise),
+                (-thick, lip - thick + 0.0005, rise - rim, rise),
+            ):
+                solid += hull([(x - f, y, z) for y, f in corners for x in (x0, x1) for z in (z0, z1)])
+    else:
+        radius = draws.number("corner", (0.01, 0.12)) * rise
+        solid += box((lip - thick, back), half, rise, fillet=radius, axis=0)
+        inset = 0.3 * radius
+        solid += frame((-thick, inset - half, inset - rise), (lip - thick + 0.0005, half - inset, rise - inset),
+                       [rim, rim, chin + rim, rim])  # fmt: skip
+    solid = solid.called("display", FRONT)
+    if back < 0:
+        wide, high = draws.number("hump_width", (0.25, 0.85)) * half, draws.number("hump_height", (0.3, 0.85)) * rise
+        wide, inner = min(wide, 0.35 * half) if panel.bend else wide, draws.number("hump_taper", (0.5, 0.95))
+        solid += hull([(x, s * wide * t, u * high * t) for x, t in ((back - 0.001, 1.0), (0.0, inner))
+                       for s in (-1, 1) for u in (-1, 1)])  # fmt: skip
+    return solid

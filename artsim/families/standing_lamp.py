@@ -36,9 +36,7 @@ def standing(draws: Draws) -> Assembly:
         base += rod(0, 0, (floor - 0.004, height), radius, sections=14)
     button = draws.chance("button", 0.35) and flat
     lamp = Assembly("base", base, 2500.0)
-    parent = "base"
-    if slides:
-        parent = lamp.add("pole", pole, prismatic("base", UP, 0.0, travel, (0, 0, sleeve)))
+    parent = lamp.add("pole", pole, prismatic("base", UP, 0.0, travel, (0, 0, sleeve))) if slides else "base"
     rim = draws.length("shade_radius", (0.08, 0.19)) * (1.0 if small else 1.4)
     tall = draws.length("shade_height", (0.8, 1.9), of=rim)
     kind = draws.pick("shade", {"cone": 0.4, "drum": 0.25, "square": 0.15, "ball": 0.2})
