@@ -53,13 +53,8 @@ def knob(foot: Vector, outward: Vector, reach: float, radius: float) -> Solid:
 def panel(kind: str, low: Vector, high: Vector, rail: float, recess: float) -> Solid:
     """Upright panel between two corners whose front faces -X: the face of a door or of a drawer.
 
-    Parameters
-    ----------
-    kind : str
-        "slab"; "shaker" (frame around a sunken board); "raised" (the board rises again in its middle); "planks";
-        "glass" (frame around a thin pane with glazing bars). A panel too small for its frame becomes a slab.
-    rail, recess : float
-        Width of the frame; depth of the sunken board behind it.
+    It is a "slab", or a frame, ``rail`` wide, around a board that is sunken by ``recess`` ("shaker"), rises again in
+    its middle ("raised") or is of "planks", or around a pane with glazing bars ("glass"). Small ones are slabs.
     """
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     sides = high - low
@@ -100,12 +95,7 @@ def _rectangle(x: float, low: Array, high: Array) -> Array:
 def flat_handle(start: Vector, end: Vector, reach: float, thickness: float, depth: float) -> Solid:
     """Flat bar along Y or Z on two posts, on a panel that faces -X; its start is below or to the -Y side of its end.
 
-    Parameters
-    ----------
-    reach : float
-        Distance of the bar's front from the panel.
-    thickness, depth : float
-        Of the bar, across it in the panel's plane and along X.
+    Its front is ``reach`` before the panel; it is ``thickness`` wide in the panel's plane and ``depth`` along X.
     """
     start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     half = np.array([0.0, 0.5 * thickness, 0.5 * thickness])
@@ -188,19 +178,10 @@ def rounded_tray(
     low: Vector, high: Vector, wall: float, radius: float, profile: ArrayLike = ((0.0, 0.0), (1.0, 0.0)),
     axis: int = 2, side: int = 1, floor: float | None = None, steps: int = 3,
 ) -> Solid:  # fmt: skip
-    """Open box with round corners: a floor and one wall around.
+    """Open box with one wall around, its corners round as seen along ``axis``, open towards that axis's ``side`` (+-1).
 
-    Parameters
-    ----------
-    wall, floor : float
-        Thickness; the floor is as thick as the wall by default, and 0 leaves it out.
-    radius : float
-        Of the four corners seen along ``axis``.
-    profile : (N, 2) float
-        From the floor (0) to the opening (1): share of the depth, and metres by which the outline shrinks there.
-        Tapered bins and bevelled shells have more than zeros.
-    axis, side : int
-        It is open towards ``side`` (1 or -1) of coordinate ``axis``: upward by default.
+    The floor is as thick as the wall by default; 0 leaves it out. ``profile`` (N, 2) holds, from the floor (0) to the
+    opening (1), the share of the depth, and metres by which the outline shrinks there: for tapers and bevels.
     """
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     depth = wall if floor is None else floor
@@ -295,30 +276,20 @@ def grid_panel(
 ) -> Solid:  # fmt: skip
     """Frame across the X axis with crossbars and a thinner board or pane between them: a door's leaf, a window's sash.
 
-    Parameters
-    ----------
-    widths : 4 float
-        Of the frame at low Y, high Y, low Z, high Z.
-    columns, rows : sequence of float
-        Y of upright bars and Z of level ones, ``bar`` wide.
-    board : float
-        Thickness of the board, in the middle of the frame's own.
-    bore : 3 float, optional
-        Y, Z and radius of a hole through one of the upright sides of the frame, as for a handle.
-    glass : bool
-        Mark the board as glass.
+    ``widths`` are those of the frame at low Y, high Y, low Z, high Z; ``columns`` and ``rows`` are the Y of upright
+    bars and the Z of level ones, ``bar`` wide; ``board`` is the board's thickness, which ``glass`` marks as such.
+    ``bore`` is Y, Z and radius of a hole through one of the upright sides of the frame, as for a handle.
     """
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
-    inner_low = low + (0, widths[0], widths[2])
-    inner_high = high - (0, widths[1], widths[3])
-    solid = box((low[0], high[0]), (inner_low[1], inner_high[1]), (low[2], inner_low[2]))
-    solid += box((low[0], high[0]), (inner_low[1], inner_high[1]), (inner_high[2], high[2]))
+    inner_low, inner_high = low + (0, widths[0], widths[2]), high - (0, widths[1], widths[3])
+    deep, across = (low[0], high[0]), (inner_low[1], inner_high[1])
+    solid = box(deep, across, (low[2], inner_low[2])) + box(deep, across, (inner_high[2], high[2]))
     for y0, y1 in ((low[1], inner_low[1]), (inner_high[1], high[1])):
         if bore is None or not y0 < bore[0] < y1:
-            solid += box((low[0], high[0]), (y0, y1), (low[2], high[2]))
+            solid += box(deep, (y0, y1), (low[2], high[2]))
             continue
         z0, z1 = bore[1] - 2 * bore[2], bore[1] + 2 * bore[2]
-        solid += box((low[0], high[0]), (y0, y1), (low[2], z0)) + box((low[0], high[0]), (y0, y1), (z1, high[2]))
+        solid += box(deep, (y0, y1), (low[2], z0)) + box(deep, (y0, y1), (z1, high[2]))
         solid += holed_plate((low[0], y0, z0), (high[0], y1, z1), bore[:2], bore[2], sections=12)
     inset = np.array([0.1 * (high[0] - low[0]), 0.0, 0.0])
     for y in columns:

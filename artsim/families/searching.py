@@ -31,13 +31,7 @@ _NEAR = 0.03
 
 
 class Search:
-    """Draws of one category and seed, one after the other, and what they taught.
-
-    Parameters
-    ----------
-    plan : function
-    constraints : Constraints
-    """
+    """Draws of one category and seed, one after the other, and what they taught."""
 
     def __init__(self, plan: Plan, constraints: Constraints) -> None:
         self.plan, self.constraints = plan, constraints

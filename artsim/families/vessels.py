@@ -69,18 +69,9 @@ def neck(radius: float, bore: float, low: float, high: float) -> Solid:
 def cap(
     radius: float, wall: float, low: float, high: float, bore: float = 0.0, top: float | None = None, sections: int = 24
 ) -> Solid:
-    """Cup upside down that covers a neck.
+    """Cup upside down that covers a neck, between two heights; ``bore`` is the radius of a hole in its top.
 
-    Parameters
-    ----------
-    radius, top : float
-        Outside at its edge, and at its top: the same by default.
-    wall : float
-        Thickness of the skirt and of the top.
-    low, high : float
-        Heights of its edge and of its top.
-    bore : float
-        Radius of a hole in the top; 0 for none.
+    ``radius`` and ``top`` are those outside at its edge and at its top, the same by default.
     """
     upper = radius if top is None else top
     shoulder = upper + (radius - upper) * wall / (high - low)  # outside, where the top begins
