@@ -165,9 +165,7 @@ def described(draw: Draw) -> str:
         return " or ".join(filter(None, (", ".join(draw.options[:-1]), draw.options[-1])))
     if draw.kind == "yes or no":
         return f"{draw.kind}, yes in {100 * draw.high:.3g} %"
-    if draw.kind == "seed":
-        return "a seed of details"
-    return f"{draw.low:.4g} to {draw.high:.4g} {draw.unit}".rstrip()
+    return "a seed of details" if draw.kind == "seed" else f"{draw.low:.4g} to {draw.high:.4g} {draw.unit}".rstrip()
 
 
 def _met(made: Assembly, name: str, wanted: Wanted, drawn: bool) -> bool:

@@ -253,9 +253,7 @@ def front_handle(kind: str, start: Vector, end: Vector, reach: float, radius: fl
         return bar_handle(start, end, (-1, 0, 0), reach, radius)
     if kind == "bow":
         return bow_handle(start, end, (-1, 0, 0), reach, radius)
-    if kind == "flat":
-        return flat_handle(start, end, reach, 2.5 * radius, radius)
-    return Solid()
+    return flat_handle(start, end, reach, 2.5 * radius, radius) if kind == "flat" else Solid()
 
 
 @deferred

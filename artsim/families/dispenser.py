@@ -9,7 +9,7 @@ import numpy as np
 from artsim.common.elementary import cos, sin
 from artsim.families.details import front_handle, rounded_tray, side_hinge
 from artsim.families.vessels import GAP, Level, cap, cross_section, dome, moulded, neck, pump_head, ribs
-from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, screw
+from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, screw, swivel
 from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, UP, Array, about, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, hull_of, ring, rod, tube, union
@@ -30,8 +30,7 @@ def _pump_bottle(draws: Draws) -> Assembly:
     half, depth = 0.5 * draws.length("width", (0.05, 0.12)), 0.5 * draws.length("depth", (0.05, 0.12))
     height = draws.length("height", (0.06, 0.24))
     shape = draws.pick("outline", ["round", "round", "square", "square", "octagon", "hexagon", "flask"])
-    if shape != "flask" and draws.chance("depth_as_width", 0.6):
-        depth = half
+    depth = half if shape != "flask" and draws.chance("depth_as_width", 0.6) else depth
     outline = cross_section(shape, draws.number("sharpness", (0.0, 1.0)))
     radius = min(half, depth) * draws.number("neck_radius", (0.25, 0.5))
     rim = height + draws.length("neck_height", (0.016, 0.03))
@@ -71,14 +70,10 @@ def _pump_bottle(draws: Draws) -> Assembly:
         if turning != "fixed":
             parent = f"collar{tail}"
             angle = 2.0 * np.pi * draws.number("collar_turns", (0.5, 2.5))
-            if count > 1:
-                # Neighbours' nozzles may not meet: they turn a little only.
-                limit = min(0.8, 0.3 * spacing / reach)
-                turn = revolute("body", UP, at, -limit, limit)
-            elif turning == "screw":
+            # Neighbours' nozzles may not meet: they turn a little only.
+            turn = swivel("body", UP, at, min(0.8, 0.3 * spacing / reach) if count > 1 else None)
+            if count == 1 and turning == "screw":
                 turn = screw("body", UP, at, 0.0, angle, (rim - height) / angle)
-            else:
-                turn = continuous("body", UP, at)
             dispenser.add(parent, collar.moved((0, y, 0)), turn)
         dispenser.add(f"pump{tail}", pump.moved((0, y, 0)), prismatic(parent, -UP, 0.0, stroke, (0, y, head)))
     return dispenser

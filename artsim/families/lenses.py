@@ -3,7 +3,7 @@
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, swivel
 from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, Array, Vector, turns
 from artsim.making.solids import Solid, box, cylinder, ellipsoid, ring
@@ -57,10 +57,8 @@ class Lens:
                 inset = 0.15 * (b * long - a * long)
                 ends = out - (a * long + inset, 0, 0), out - (b * long - inset, 0, 0)
                 grip += cylinder(*ends, 0.06 * wall, sections=4)
-            turn = continuous("body", FRONT, self.center)
-            if draws.chance(f"{name}_stops", 0.5):
-                turn = revolute("body", FRONT, self.center, 0.0, draws.angle(f"{name}_angle", (0.8, 4.5)))
-            self.parts.append((name, grip, turn))
+            limit = draws.angle(f"{name}_angle", (0.8, 4.5)) if draws.chance(f"{name}_stops", 0.5) else None
+            self.parts.append((name, grip, swivel("body", FRONT, self.center, limit, 0.0)))
         if hollow:
             self._sliding(draws, bore - 0.0008, 0.12 * long, long, draws.integer("tube_count", 1, 2))
 

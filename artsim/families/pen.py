@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute, screw
+from artsim.making.assembly import Assembly, prismatic, screw, swivel
 from artsim.making.draws import Draws
 from artsim.making.outlines import UP, Array
 from artsim.making.solids import Solid, box, hull, loft, union
@@ -227,11 +227,8 @@ def _twisted(draws: Draws, section: _Section, length: float, radius: float) -> A
     upper += section.rod([(last, length - 0.0002), (last * taper, length + rise)])
     upper += _clip(draws, section, radius, length, (length - split) * draws.number("clip_length", (0.5, 0.9)))
     pen = Assembly("body", body, 1100.0)
-    if draws.chance("turns_freely", 0.5):
-        joint = continuous("body", UP, (0, 0, split))
-    else:
-        joint = revolute("body", UP, (0, 0, split), 0.0, draws.angle("barrel_angle", (1.5, 2.0 * np.pi)))
-    pen.add("barrel", upper, joint)
+    limit = None if draws.chance("turns_freely", 0.5) else draws.angle("barrel_angle", (1.5, 2.0 * np.pi))
+    pen.add("barrel", upper, swivel("body", UP, (0, 0, split), limit, 0.0))
     return pen
 
 

@@ -134,11 +134,8 @@ def _knuckles(s: Shape, of_door: bool) -> list[tuple[float, float]]:
     """Lowest and highest point of the barrels: two pairs, the door's standing on the body's."""
     low, high = s.door[0][2], s.door[1][2]
     length = 0.05 * (high - low) + 0.01
-    spans = []
-    for share in (0.15, 0.75):
-        z = low + share * (high - low)
-        spans.append((z + GAP, z + length) if of_door else (z - length, z))
-    return spans
+    levels = (low + share * (high - low) for share in (0.15, 0.75))
+    return [(z + GAP, z + length) if of_door else (z - length, z) for z in levels]
 
 
 def _door(draws: Draws, s: Shape, combination: bool, opener: str) -> Solid:

@@ -245,9 +245,8 @@ def _column(draws: Draws, table: Assembly) -> None:
         base += rod(0, 0, (foot + 0.01, top - 0.05), radius)
         base += box((-radius, 0.5 * radius), radius, (top - 0.06, top - 0.02))
         hinge = (radius + 0.01, 0.0, top - 0.03)
-        lugs = Solid()
-        for y in (-1.3 * radius, 1.3 * radius):
-            lugs += box(about(hinge[0], 0.01), about(y, 0.008), (top - 0.04, top + 0.002))
+        deep, upright = about(hinge[0], 0.01), (top - 0.04, top + 0.002)
+        lugs = union(box(deep, about(y, 0.008), upright) for y in (-1.3 * radius, 1.3 * radius))
         base += box((0.0, hinge[0] + 0.005), 1.1 * radius, (top - 0.04, top - 0.025))
         # Beyond the hinge's axis the top comes down before the column.
         tip = revolute("body", (0, 1, 0), hinge, 0.0, draws.angle("top_angle", (0.5, 0.9)))

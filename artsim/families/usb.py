@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from artsim.families.keys import key_outline, sleeve
-from artsim.making.assembly import Assembly, continuous, prismatic, revolute
+from artsim.making.assembly import Assembly, prismatic, revolute, swivel
 from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, UP, Array, rounded_rectangle
 from artsim.making.solids import Solid, box, deferred, hull, hull_of, prism, ring, rod, tube, union
@@ -184,11 +184,8 @@ def _swivel(draws: Draws, usb: Assembly, stick: _Stick) -> None:
     for z, out in ((low - sheet, -1.0), (high + sheet, 1.0)):
         cover += rod(pivot, 0, (z - out * 0.5 * sheet, z + out * 0.0006), pin, sections=16)
     axis = draws.one_of("cover_opens", {"left": (0, 0, -1), "right": (0, 0, 1)})
-    if draws.chance("cover_turns_freely", 0.3):
-        turn = continuous("body", axis, (pivot, 0, 0))
-    else:
-        turn = revolute("body", axis, (pivot, 0, 0), 0.0, draws.angle("cover_angle", (1.6, 3.3)))
-    usb.add("cover", cover, turn, density=4000.0)
+    limit = None if draws.chance("cover_turns_freely", 0.3) else draws.angle("cover_angle", (1.6, 3.3))
+    usb.add("cover", cover, swivel("body", axis, (pivot, 0, 0), limit, 0.0), density=4000.0)
 
 
 def _sleeved(draws: Draws, usb: Assembly, stick: _Stick) -> None:

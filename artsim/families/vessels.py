@@ -37,9 +37,7 @@ def cross_section(kind: str, sharpness: float = 0.5) -> Array:
         offset = np.mod(angles, corner) - 0.5 * corner
         outline = circle * (cos(0.5 * corner) / cos(offset))[:, None]
         return outline / np.abs(outline).max(axis=0)
-    if kind == "flask":
-        return np.column_stack([np.minimum(circle[:, 0], 0.35), circle[:, 1]])
-    return circle
+    return np.column_stack([np.minimum(circle[:, 0], 0.35), circle[:, 1]]) if kind == "flask" else circle
 
 
 @deferred

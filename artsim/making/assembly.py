@@ -44,11 +44,13 @@ def continuous(parent: str, axis: Vector, origin: Vector, **more: Any) -> JointS
     return JointSpec("continuous", parent, axis, origin, **more)
 
 
-def swivel(parent: str, axis: Vector, origin: Vector, limit: float | None = None) -> JointSpec:
-    """Joint that turns freely, or by up to ``limit`` radians either way."""
+def swivel(
+    parent: str, axis: Vector, origin: Vector, limit: float | None = None, lower: float | None = None
+) -> JointSpec:
+    """Joint that turns freely, or by up to ``limit`` radians either way; or from ``lower`` to that."""
     if limit is None:
         return continuous(parent, axis, origin)
-    return revolute(parent, axis, origin, -limit, limit)
+    return revolute(parent, axis, origin, -limit if lower is None else lower, limit)
 
 
 def prismatic(
