@@ -37,10 +37,8 @@ def _rigid(draws: Draws) -> Assembly:
     band = draws.one_of("edges", {"plain": 0.0, "banded": wall * draws.number("band_thickness", (0.3, 0.6))})
     seam = height + GAP
 
-    body = _rigid_body(draws, x, y, height, wall, radius)
-    body += _bands(draws, x, y, 0.0, height, band, wall, radius)
-    body += _interior(draws, x, y, height, wall)
-    body += _feet(draws, x, y, wall)
+    body = _rigid_body(draws, x, y, height, wall, radius) + _bands(draws, x, y, 0.0, height, band, wall, radius)
+    body += _interior(draws, x, y, height, wall) + _feet(draws, x, y, wall)
     side_handles = height > 0.12 and draws.chance("side_handles", 0.25)
     if side_handles:
         half, z = min(0.4 * x, 0.06), draws.number("side_handle_height", (0.55, 0.75)) * height

@@ -32,8 +32,7 @@ def _mantel_clock(draws: Draws) -> Assembly:
     kind = draws.pick("case", ["block", "arch", "tambour", "house", "drum", "lancet"])
     half = 0.5 * draws.length("case_width", (1.12, 1.5), of=2 * radius)
     low = -draws.length("case_bottom", (1.12, 1.8), of=radius)
-    body = dial_plate(draws, radius)
-    body += rim(draws, 1.005 * radius, 0.08 * radius, 0.003 + 0.1 * radius)
+    body = dial_plate(draws, radius) + rim(draws, 1.005 * radius, 0.08 * radius, 0.003 + 0.1 * radius)
     around = [*outline("round", half), (-half, low), (half, low)]
     if kind == "drum":
         low = -draws.length("feet_bottom", (1.05, 1.4), of=half)
@@ -138,8 +137,7 @@ def _alarm_clock(draws: Draws) -> Assembly:
     radius = 0.5 * draws.length("diameter", (0.05, 0.12))
     deep = draws.length("depth", (0.6, 1.3), of=radius)
     half = 0.5 * draws.length("case_width", (1.08, 1.25), of=2 * radius)
-    body = dial_plate(draws, radius)
-    body += rim(draws, 1.005 * radius, 0.06 * radius, 0.003 + 0.12 * radius)
+    body = dial_plate(draws, radius) + rim(draws, 1.005 * radius, 0.06 * radius, 0.003 + 0.12 * radius)
     if draws.chance("bells", 0.65):
         return _twin_bell_clock(draws, body, radius, deep, half)
     edge = 0.5 * draws.length("case_height", (0.9, 1.3), of=2 * half)
@@ -207,8 +205,7 @@ def _watch(draws: Draws) -> Assembly:
     deep = draws.length("depth", (0.25, 0.55), of=radius)
     half = 0.5 * draws.length("case_width", (1.06, 1.18), of=2 * radius)
     rise = 0.16 * radius
-    body = dial_plate(draws, radius)
-    body += rod((0.0015, 0.5 * deep), 0, 0, half, sections=30)
+    body = dial_plate(draws, radius) + rod((0.0015, 0.5 * deep), 0, 0, half, sections=30)
     body += rod((0.5 * deep - 1e-4, deep), 0, 0, half, 0.8 * half, 30)
     body += ring((0.0015 - 0.5 * rise, 0, 0), FRONT, 1.005 * radius, half, rise, 28)
     x, neck = 0.3 * deep, half + 0.12 * radius
@@ -272,8 +269,7 @@ def _pendulum_clock(draws: Draws) -> Assembly:
     radius, deep = 0.5 * draws.length("diameter", (0.12, 0.28)), draws.length("depth", (0.05, 0.11))
     kind = draws.pick("case", ["round", "octagon", "square", "house", "arch"])
     half = 0.5 * draws.length("case_width", (1.1, 1.35), of=2 * radius)
-    body = dial_plate(draws, radius)
-    body += rim(draws, 1.005 * radius, 0.06 * radius, 0.003 + 0.1 * radius)
+    body = dial_plate(draws, radius) + rim(draws, 1.005 * radius, 0.06 * radius, 0.003 + 0.1 * radius)
     low = -half
     if kind in ("house", "arch"):
         body += box((0.002, deep), half, half)

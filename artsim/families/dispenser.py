@@ -165,8 +165,7 @@ def _drink_jar(draws: Draws) -> Assembly:
         "keg": [(0.0, 0.8), (0.2, 0.94), (0.5, 1.0), (0.8, 0.94), (1.0, 0.78)],
     }[draws.pick("jar_shape", ["drum", "urn", "keg"])]
     levels: list[Level] = [(foot + z * height, s * half, s * half, 1.0 if z == 1.0 else 0.0) for z, s in shares]
-    body = moulded(levels, outline)
-    body += _stand(draws, shares[0][1] * half, foot)
+    body = moulded(levels, outline) + _stand(draws, shares[0][1] * half, foot)
     top = foot + height
     z = foot + height * draws.number("tap_height", (0.08, 0.16))
     wide = float(np.interp(z, [v[0] for v in levels], [v[1] for v in levels]))

@@ -97,8 +97,7 @@ def _head(draws: Draws, cage: float, motor: float, level: float, pins: float, ba
     middle = back - half
     wide = 0.75 * motor
     solid = rod((back, 0.6 * motor), 0, 0, wide) + rod((0.59 * motor, 0.85 * motor), 0, 0, wide, 0.6 * wide)
-    solid += rod(0, (-pins, pins), 0, 0.35 * motor, sections=16)
-    solid += _cage(draws, cage, half, wide).moved((middle, 0, 0))
+    solid += rod(0, (-pins, pins), 0, 0.35 * motor, sections=16) + _cage(draws, cage, half, wide).moved((middle, 0, 0))
     return solid.moved((0, 0, level)), middle
 
 
