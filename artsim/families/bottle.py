@@ -13,7 +13,7 @@ import numpy as np
 
 from artsim.common.elementary import cos
 from artsim.families.details import cheeks
-from artsim.families.vessels import GAP, Level, cap, cross_section, dome, grip_loop, moulded, neck, pump_head, ribs
+from artsim.families.vessels import GAP, cap, cross_section, dome, grip_loop, moulded, neck, pump_head, ribs
 from artsim.making.assembly import Assembly, JointSpec, continuous, prismatic, revolute, screw
 from artsim.making.draws import Draws
 from artsim.making.outlines import FRONT, SIDE, UP, arch
@@ -79,7 +79,9 @@ def _body(draws: Draws, shape: str, wide: bool, tall: float) -> tuple[Solid, Mou
     if plain and draws.chance("neck_aside", 0.2):  # a can
         shift = draws.one_of("neck_at", {"back": -1.0, "front": 1.0}) * draws.number("neck_shift", (0.2, 0.8))
         shift *= max(depth - 1.2 * radius, 0.0)
-    body = moulded(_bevelled(levels), outline, shift)
+    (z, x, y, r), top = levels[0], levels[1][0]
+    cut = min(0.003, 0.3 * (top - z))  # a small bevel at the foot
+    body = moulded([(z, x - cut, y - cut, r), (z + cut, x, y, r), *levels[1:]], outline, shift)
     wall = radius * draws.number("neck_wall", (0.12, 0.25))
     rim = foot + max(tall, radius * draws.number("neck_height", (0.5, 1.1)))
     body += neck(radius, radius - wall, foot - 0.0005, rim)
@@ -141,13 +143,6 @@ def _profile(draws: Draws, shape: str) -> list[tuple[float, float, float]]:
     taper = draws.number("shoulder_width", (0.7, 1.0))  # shampoo
     return [(0.0, draws.number("foot_width", (0.8, 0.96)), 0.0), (0.06, 1.0, 0.0), (0.55, 0.5 + 0.5 * taper, 0.0),
             (0.88, taper, soft), (1.0, 0.7 * taper, 0.6)]  # fmt: skip
-
-
-def _bevelled(levels: list[Level]) -> list[Level]:
-    """The levels, with a small bevel at the foot."""
-    (z, x, y, r), top = levels[0], levels[1][0]
-    cut = min(0.003, 0.3 * (top - z))
-    return [(z, x - cut, y - cut, r), (z + cut, x, y, r), *levels[1:]]
 
 
 def _closing(draws: Draws, mouth: Mouth, height: float) -> JointSpec:

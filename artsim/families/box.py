@@ -7,8 +7,7 @@ dividers, handles and latches of rigid boxes vary.
 import numpy as np
 
 from artsim.common.elementary import cos, sin
-from artsim.families.details import bow_handle, knob, rounded_tray
-from artsim.families.proportions import unusual_sides
+from artsim.families.details import bow_handle, knob, rounded_tray, unusual_sides
 from artsim.making.assembly import Assembly, revolute
 from artsim.making.draws import Draws
 from artsim.making.outlines import UP, Array, about, ends

@@ -1,4 +1,4 @@
-"""Details that several families share: handles and hinged panels."""
+"""Details that several families share: handles, hinged panels, unusual proportions."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from artsim.common.elementary import arctan2, cos, sin
+from artsim.common.elementary import arccos, arcsin, arctan2, cos, sin
 from artsim.common.products import unit
 from artsim.making.assembly import Assembly, JointSpec, prismatic, revolute
 from artsim.making.draws import Draws, Interval
@@ -17,6 +17,29 @@ from artsim.making.solids import Solid, box, cylinder, deferred, frame, hull, hu
 def drawn_from(draws: Draws, name: str, spans: Mapping[str, Interval], chances: Sequence[float] = ()) -> float:
     """A number from one of several ranges: all are drawn from (``corner_round``), and one is picked (``corner``)."""
     return draws.one_of(name, {word: draws.number(f"{name}_{word}", span) for word, span in spans.items()}, chances)
+
+
+def unusual_sides(draws: Draws, low: Vector, high: Vector, least: Vector) -> tuple[float, float, float]:
+    """Depth, width and height of a box, metres, one of which is near the end of its range.
+
+    ``low`` and ``high`` are the smallest and largest share of each side in the diagonal. The box is up to a third
+    larger than the metres ask for that each side needs at least. Few objects of a family are so: a flat draw would make
+    most of them odd.
+    """
+    sides = ["depth", "width", "height"]
+    axis = sides.index(draws.pick("unusual_side", sides))
+    b, c = (k for k in range(3) if k != axis)
+    near, small = draws.number("near_end", (0.0, 0.2)), draws.chance("unusually_small", 0.5)
+    value = low[axis] * (1.0 + near) if small else high[axis] - near * (1.0 - high[axis])
+    rest = float(np.sqrt(1.0 - value * value))
+    # Angle of the other two sides in their plane.
+    first = max(arccos(min(high[b] / rest, 1.0)), arcsin(min(low[c] / rest, 1.0)))
+    last = min(arccos(min(low[b] / rest, 1.0)), arcsin(min(high[c] / rest, 1.0)))
+    angle = draws.angle("other_sides", (first, last)) if first < last else 0.5 * (first + last)
+    shares = np.empty(3)
+    shares[[axis, b, c]] = value, rest * cos(angle), rest * sin(angle)
+    depth, width, height = shares * (np.asarray(least) / shares).max() * draws.number("unusual_scale", (1.0, 1.3))
+    return float(depth), float(width), float(height)
 
 
 @deferred
@@ -75,20 +98,16 @@ def panel(kind: str, low: Vector, high: Vector, rail: float, recess: float) -> S
     board = box(inner_low + (recess, 0, 0), inner_high - (0.001, 0, 0))
     if kind == "raised":
         ledge = 0.25 * rail
-        rise = [_rectangle(low[0] + x, inner_low[1:] + s, inner_high[1:] - s)
-                for x, s in ((recess + 0.001, ledge), (0.2 * recess, 2.0 * ledge))]  # fmt: skip
-        return bars + board + hull(np.concatenate(rise))
+        (y0, z0), (y1, z1) = inner_low[1:], inner_high[1:]
+        rise = [(low[0] + x, y, z) for x, s in ((recess + 0.001, ledge), (0.2 * recess, 2.0 * ledge))
+                for y in (y0 + s, y1 - s) for z in (z0 + s, z1 - s)]  # fmt: skip
+        return bars + board + hull(rise)
     if kind == "planks":
         edges = np.linspace(inner_low[1], inner_high[1], int(2 + sides[1] // 0.09))
         for left, right in pairwise(edges):
             board += box((low[0] + 0.4 * recess, left + 0.002, inner_low[2]),
                          (high[0] - 0.002, right - 0.002, inner_high[2]))  # fmt: skip
     return bars + board
-
-
-def _rectangle(x: float, low: Array, high: Array) -> Array:
-    """(4, 3) corners of a rectangle across the X axis."""
-    return np.array([(x, y, z) for y in (low[0], high[0]) for z in (low[1], high[1])])
 
 
 @deferred

@@ -9,8 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from artsim.families.details import front_handle, knob, panel
-from artsim.families.proportions import unusual_sides
+from artsim.families.details import front_handle, knob, panel, unusual_sides
 from artsim.families.table_parts import PEDESTALS, four_legs, levels
 from artsim.making.assembly import Assembly, prismatic
 from artsim.making.draws import Draws

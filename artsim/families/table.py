@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from artsim.common.elementary import cos, sin
+from artsim.families.details import unusual_sides
 from artsim.families.fronts import Style
-from artsim.families.proportions import unusual_sides
 from artsim.families.table_parts import (
     GAP,
     PEDESTALS,
