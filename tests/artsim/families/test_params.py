@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import artsim
@@ -11,6 +13,7 @@ from artsim.errors import ConfigError
 from artsim.export import export
 from artsim.families import CATEGORIES, assembly_of, draws_of, make
 from artsim.families.catalogue import describe_family
+from artsim.making.draws import Draws
 from artsim.model.params import Params
 
 
@@ -117,3 +120,23 @@ def test_descriptions_fit_a_screen_and_tell_numbered_parameters_once(category: s
 
 def test_plans_say_how_many_parts_there_will_be() -> None:
     assert len(assembly_of("drawer", 0)) == len(make("drawer", 0))
+
+
+def test_what_is_drawn_in_one_call_is_what_single_draws_give() -> None:
+    one, each = Draws(np.random.default_rng(5)), Draws(np.random.default_rng(5))
+    lengths = one.lengths(width=(0.4, 0.6), depth=(0.1, 0.2), of=2.0)
+    assert lengths == (each.length("width", (0.4, 0.6), of=2.0), each.length("depth", (0.1, 0.2), of=2.0))
+    assert 0.8 <= lengths[0] <= 1.2
+    side = one.one_of("side", {"left": -1.0, "right": 1.0}, (0.2, 0.8))
+    assert side == {"left": -1.0, "right": 1.0}[each.pick("side", {"left": 0.2, "right": 0.8})]
+    turn = one.turn("angle", (60.0, 110.0))
+    assert turn == pytest.approx(each.degrees("angle", (60.0, 110.0)) * math.pi / 180.0)
+    assert one.drawn == each.drawn  # degrees are what is listed and asked for
+    assert one.drawn["angle"].unit == "deg"
+
+
+def test_a_name_that_is_asked_for_stands_for_what_it_says() -> None:
+    for name, side in (("left", -1.0), ("right", 1.0)):
+        for seed in range(20):
+            draws = Draws(np.random.default_rng(seed), {"side": name})
+            assert draws.one_of("side", {"left": -1.0, "right": 1.0}, (0.5, 0.5)) == side
