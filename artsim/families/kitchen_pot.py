@@ -138,9 +138,7 @@ def _lid(
     z = height + GAP
     rim = draws.length("lid_rim", (0.003, 0.008))
     solid = rod(0, 0, (z, z + rim), lid_radius, sections=24)
-    dome = lid_radius * draws.number("lid_dome", (0.08, 0.5))
-    if draws.pick("lid", ["flat", "domed"]) == "flat":
-        dome = lid_radius * 0.03
+    dome = lid_radius * draws.one_of("lid", {"flat": 0.03, "domed": draws.number("lid_dome", (0.08, 0.5))})
     spread = draws.number("dome_width", (0.86, 0.99))
     heights, shares = np.array([0.0, 0.45, 0.75, 0.93, 1.0]), np.array([1.0, 0.86, 0.66, 0.42, 0.15])
     low = z + rim - 0.0005

@@ -105,11 +105,9 @@ def _battery_cover(draws: Draws, remote: Assembly, body: _Body) -> bool:
     slides = bool(even and np.ptp(halves) < 0.3 * halves.max()) and draws.chance("battery_cover_slides", 0.75)
     if not slides and backs[0] > backs.min() + 0.1 * end:
         return False  # the bent end of the body would stop a cover that swings
-    if slides:  # over a flat back
-        backs = np.full(len(levels), backs.min())
     solid = body.between(end, length)
-    if slides:
-        lower = np.append(levels[:-1], end + 0.0004)
+    if slides:  # over a flat back
+        backs, lower = np.full(len(levels), backs.min()), np.append(levels[:-1], end + 0.0004)
         solid += loft(cross_sections(lower, fronts, backs - thick, halves, body.roundness))
     else:
         solid += body.between(0.0, end + 0.0004, thick)
