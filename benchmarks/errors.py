@@ -47,8 +47,8 @@ BINS = {"points": (0, 80, 400, 1200, NUM_POINTS + 1), "percent moved": (0, 10, 3
 _SURE = 12.0  # the odds of a label that was told, as a logarithm
 SHOWN = 4
 """Views in the picture of the worst."""
-_LEAST, _TICKS = 0.1, (0.1, 1, 10, 100)
-"""Degrees that smaller errors of rotation are drawn at, and ticks."""
+_LEAST = 0.1
+"""Degrees that smaller errors of rotation are drawn at."""
 FACES = ("-x", "-y", "-z", "+x", "+y", "+z")
 
 
@@ -238,10 +238,12 @@ def draw(every: dict[str, dict[str, Array]], path: Path) -> None:
             axes = figure.add_subplot(2, len(every), row * len(every) + n + 1)
             shown = np.maximum(table[column], _LEAST) if row == 0 else table[column]
             axes.scatter(np.maximum(table["points"], 1), shown, s=6, alpha=0.5)
-            axes.set(xscale="log", xlim=(0.6, 2 * NUM_POINTS), xlabel=f"points of {NUM_POINTS:,}, 1 or none at 1")
+            axes.set(xscale="log", xlim=(0.6, 2 * NUM_POINTS), xlabel=f"points of {NUM_POINTS:,}")
+            axes.set(xticks=(1, 10, 100, 1000), xticklabels=("≤1", "10", "100", "1,000"))
             axes.set(title=category if row == 0 else "", ylabel=label if n == 0 else "")
             if row == 0:
-                axes.set(yscale="log", ylim=(0.7 * _LEAST, 250), yticks=_TICKS, yticklabels=map(str, _TICKS))
+                axes.set(yscale="log", ylim=(0.7 * _LEAST, 250))
+                axes.set(yticks=(_LEAST, 1, 10, 100), yticklabels=(f"≤{_LEAST}", "1", "10", "100"))
             else:
                 axes.set(ylim=(-0.05, 1.05))
             axes.grid(alpha=0.3)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
+from artsim.common.progress import track
 from artsim.errors import ConfigError
 from artsim.formats.coco import mask_record
 from artsim.scenes import SceneDataset, SceneRecord
@@ -65,7 +66,7 @@ def realistic_detections(
     """
     found, names = list[dict[str, Any]](), scenes.categories
     number = {name: i for i, name in enumerate(names, start=1)}
-    for image, record in enumerate(scenes):
+    for image, record in enumerate(track("detections", scenes, total=len(scenes), unit="image", leave=False)):
         rng = np.random.default_rng([seed, record.entry.scene, record.entry.view])
         for category, score, mask in _of_view(record, names, flaws or Flaws(), rng):
             told = {"image_id": image, "file_name": record.entry.key, "category_id": number[category]}

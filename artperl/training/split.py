@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,11 +12,13 @@ from pathlib import Path
 from artperl.data.categories import Parts, order_parts
 from artsim.checks.conventions import doubts
 from artsim.common.files import read_json, write_atomic
-from artsim.common.progress import say, track
+from artsim.common.progress import track
 from artsim.datasets.splits import SPLITS, assign_splits
 from artsim.errors import AssetError, ConfigError, DatasetError
 from artsim.loading.sources import FileSource
 from artsim.model.objects import ArticulatedObject
+
+log = logging.getLogger(__name__)
 
 _SHARES = (0.6, 0.2, 0.2)
 _LEAST = 5
@@ -50,7 +53,7 @@ class Split:
         """
         objects = [order_parts(obj, parts) for obj in _read(sources)]
         for where, what in doubts(objects, [source.name for source in sources]):
-            say(f"{where} looks wrong: {what}")
+            log.warning(f"{where} looks wrong: {what}")
         if name is None:
             return cls(objects, objects, objects, {})
         objects = [replace(obj, category=name) for obj in objects]
@@ -84,7 +87,7 @@ class Split:
             return
         if not path.exists():
             write_atomic(path, (json.dumps(self.frozen, indent=1) + "\n").encode())
-            say(", ".join(f"{split} {len(own)}" for split, own in self.frozen.items()) + f" objects: {path}")
+            log.info(", ".join(f"{split} {len(own)}" for split, own in self.frozen.items()) + f" objects: {path}")
         elif read_json(path, "the split", DatasetError, _MAX_BYTES) != self.frozen:
             raise DatasetError(
                 "the objects are not those that this run was begun with", path, "restore them, or give another --out"
@@ -102,7 +105,7 @@ def _read(sources: Sequence[FileSource]) -> list[ArticulatedObject]:
         raise problems[0]
     if problems:
         for problem in problems:
-            say(str(problem))
+            log.error(problem)
         raise AssetError(
             f"{len(problems)} of {len(sources)} objects cannot be used", "--objects", "mend them, or leave them out"
         )

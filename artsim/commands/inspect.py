@@ -9,6 +9,7 @@ import tyro
 
 from artsim.commands.having import categories_named
 from artsim.common.program import Figures
+from artsim.common.progress import track
 from artsim.loading.roots import Opened
 
 
@@ -55,16 +56,15 @@ class Families(Figures):
         from artsim.families.catalogue import describe_family
 
         names = categories_named(self.names or ("all",))
-        for name in names:
+        for name in track("families", names, unit="family", leave=False):
             self.say(describe_family(name, self.objects))
         self.finish({name: _figures(name, self.objects) for name in names} if self.json else None)
 
 
 def _figures(category: str, count: int) -> dict[str, Any]:
-    """Ranges of numbers of parts and of metres, objects with each joint type and feature, and what draws may give."""
+    """Ranges of numbers of parts and of metres, objects with each joint type and feature, and what a draw may give."""
     from artsim.families.catalogue import seen_of
     from artsim.families.constraints import FEATURES, LENGTHS, described, measured, measured_length
-    from artsim.making.draws import ranges
 
     traces, made = seen_of(category, count)
     numbers = {"parts": [len(own) for own in made]} | {
@@ -75,5 +75,5 @@ def _figures(category: str, count: int) -> dict[str, Any]:
         **{name: (min(values), max(values)) for name, values in numbers.items()},
         "joint_types": Counter(kind for own in made for kind in set(own.joint_types[1:])),
         **{name: sum(bool(measured(own, name)) for own in made) for name in FEATURES},
-        "parameters": {name: described(draw) for name, draw in ranges(trace.drawn for trace in traces).items()},
+        "parameters": {name: described(draw) for trace in traces for name, draw in trace.drawn.items()},
     }

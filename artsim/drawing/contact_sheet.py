@@ -13,6 +13,7 @@ from artsim.common.extras import require_extra
 from artsim.common.names import printable, safe_name
 from artsim.common.outputs import check_output, write_output
 from artsim.common.palette import PALETTE
+from artsim.common.progress import track
 from artsim.datasets.dataset import Dataset
 from artsim.errors import ArtsimError, AssetError
 from artsim.loading.urdf import load
@@ -140,7 +141,7 @@ def contact_sheet(shown: Sequence[Shown]) -> bytes:
     blocks = figure.add_gridspec(
         rows, columns, wspace=0.03, hspace=0.24, left=0.006, right=0.994, top=1 - 0.42 / (2.75 * rows), bottom=0.004
     )
-    for number, one in enumerate(shown):
+    for number, one in enumerate(track("pictures", shown, unit="row", leave=False)):
         block = blocks[number // columns, number % columns].subgridspec(1, 3, wspace=0.02)
         axes = [figure.add_subplot(block[0, i]) for i in range(3)]
         draw_depth(axes[0], one)

@@ -7,6 +7,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from artsim.common.names import printable
+from artsim.common.progress import track
 from artsim.model.draws import farther_ends
 from artsim.model.kinematics import Array
 from artsim.model.objects import ArticulatedObject
@@ -35,7 +36,7 @@ def draw_gallery(objects: Sequence[ArticulatedObject], states: int = 3) -> bytes
     draw = ImageDraw.Draw(sheet)
     alike = len({obj.category for obj in objects}) < len(objects)
     font = ImageFont.load_default(size=_FONT)
-    for number, obj in enumerate(objects):
+    for number, obj in enumerate(track("gallery", objects, unit="object", leave=False)):
         row, column = divmod(number, columns)
         x, y = column * states * _TILE, row * (_TILE + _HEADER)
         title = printable(f"{obj.category} {obj.object_id if alike else ''}".replace("_", " "))

@@ -62,7 +62,7 @@ def test_too_few_files_get_a_command_that_makes_more(tmp_path: Path) -> None:
     assert len(these.train) == 2
 
 
-def test_every_file_that_does_not_load_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_file_that_does_not_load_is_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     laptops(tmp_path, 6)
     (tmp_path / "laptop_3" / "mobility.urdf").write_text(BOX_LAPTOP.replace('child link="lid"', 'child link="cover"'))
     with pytest.raises(AssetError, match=r"laptop_3.*'cover' does not exist"):
@@ -70,7 +70,7 @@ def test_every_file_that_does_not_load_is_named(tmp_path: Path, capsys: pytest.C
     (tmp_path / "laptop_5" / "mobility.urdf").write_text(BOX_LAPTOP[:99])
     with pytest.raises(AssetError, match="2 of 6"):
         split_of(tmp_path)
-    said = "".join(capsys.readouterr())
+    said = caplog.text
     assert "laptop_3" in said
     assert "laptop_5" in said
 
