@@ -8,6 +8,7 @@ import tyro
 
 from artsim.common.outputs import check_output, write_output
 from artsim.common.program import Figures
+from artsim.errors import ConfigError
 
 log = logging.getLogger(__name__)
 
@@ -37,6 +38,8 @@ class Score(Figures):
         from artsim.datasets.dataset import open_dataset
         from artsim.datasets.frozen import frozen_name
 
+        if not self.predictions:
+            raise ConfigError("there are no estimates", "score", "name files of them")
         for path in (self.out, self.json_file):
             if path is not None:
                 check_output(path, self.predictions)

@@ -61,6 +61,16 @@ def test_options_of_messages_stand_anywhere_and_json_goes_to_a_file_that_is_name
     assert (both.returncode, both.stdout) == (2, "")
 
 
+@pytest.mark.slow
+def test_estimates_that_are_taken_for_the_file_of_figures_are_not_overwritten(tmp_path: Path) -> None:
+    estimates = tmp_path / "estimates.json"
+    estimates.write_text("[]")
+    refused = run("artperl", "score", "--json", str(estimates), "--data", str(tmp_path))
+    assert refused.returncode == 2
+    assert "no estimates" in refused.stderr
+    assert estimates.read_text() == "[]"
+
+
 def test_errors_are_messages_and_keep_their_exit_code() -> None:
     for options, level in (((), None), (("--log-json",), "error"), (("--quiet",), None)):
         failed = run("artsim", "inspect", "nowhere", *options)

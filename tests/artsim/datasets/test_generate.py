@@ -159,7 +159,7 @@ def test_ctrl_c_stops_quietly_and_says_how_to_go_on(shards: int, sources: list[S
     assert not list(out.glob("**/.*.part"))
     if shards:
         again = subprocess.run(command(objects, out), check=True, capture_output=True, text=True)
-        assert "1500 samples" in again.stdout
+        assert "1500 samples" in again.stderr
         assert len(list(artsim.open_dataset(out))) == 1500
 
 
