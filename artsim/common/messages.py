@@ -26,7 +26,7 @@ class Messages:
     """Options of every command: what it says on standard error."""
 
     verbose: bool = False
-    """Also say details: versions, times, and of an error where in the code it is raised."""
+    """Also say versions, times, and where in the code an error is raised."""
     quiet: bool = False
     """Say warnings and errors alone: no progress, no notes."""
     log_json: bool = False

@@ -9,6 +9,7 @@ import operator
 import os
 import platform
 import re
+import shutil
 import sys
 import time
 from collections.abc import Iterator, Mapping
@@ -44,7 +45,7 @@ class Figures:
     """Options of commands that print figures."""
 
     json: Path | None = None
-    """Write the figures to this .json file. --json without a file prints them, in one line, instead of the text."""
+    """Print figures in one line of JSON, instead of text; or write them to this .json file."""
 
     def __post_init__(self) -> None:
         if self.json_file is not None:  # before the work
@@ -87,11 +88,16 @@ _ENDS = """Every command takes --help, --verbose, --quiet and --log-json; those 
 --version prints the version; --completion bash (or zsh, fish) prints a script that completes commands.
 Exit codes: 0 done, 1 some items failed, 2 a wrong input or option, or a failed check, 130 stopped by Ctrl-C."""
 _WIDTH, _TYPED = 110, 34
-"""Columns of a line of help, and of those in which an option is typed."""
+"""Columns of a line of help, at most, and of those in which an option is typed."""
 _ONE_COLUMN = "129"
 """Columns of a terminal on which tyro puts no group beside another."""
 _EVERY = "of every command"
 """Title of the options that all commands have."""
+
+
+def _columns() -> int:
+    """Of a line of help; a file takes whole ones."""
+    return min(_WIDTH, shutil.get_terminal_size((_WIDTH, 0)).columns)
 
 
 def _overview(verbs: Verbs, program: str, description: str) -> str:
@@ -103,7 +109,7 @@ def _overview(verbs: Verbs, program: str, description: str) -> str:
         for verb in group:
             first = inspect.cleandoc(_class_of(verb).__doc__).partition("\n\n")[0]
             text = " ".join(first.split()).partition(". ")[0].rstrip(".")
-            lines += wrap(f"  {verb_name(verb):{wide}}  {text}", _WIDTH, subsequent_indent=" " * (wide + 4))
+            lines += wrap(f"  {verb_name(verb):{wide}}  {text}", _columns(), subsequent_indent=" " * (wide + 4))
     return "\n".join([*lines, "", _ENDS])
 
 
@@ -149,7 +155,7 @@ def _brief(full: str) -> str:
         above, _, below = full.partition("\n options ")
     usage, first, *more = above.strip().split("\n\n")
     examples = [text for text in more if re.search(r": art\w+ ", text)][:2]
-    lines = [usage, "", *wrap(first, _WIDTH), *(["", *examples] if examples else [])]
+    lines = [usage, "", *wrap(first, _columns()), *(["", *examples] if examples else [])]
     groups: dict[str, list[list[str]]] = {}
     for row in full[len(above) :].splitlines():
         if re.match(r" \w", row):
@@ -165,16 +171,18 @@ def _brief(full: str) -> str:
         elif row.startswith("   ") and row.strip():
             told[-1][1] += f" {row}"
     groups[_EVERY] = groups.pop(_EVERY)
+    every = [option for options in groups.values() for option in options]
+    for option in every:
+        option[0] = re.sub(r"\{None\}\||None,|, --no-\S+", "", option[0])
+        option[0] = cut(re.sub(r"\[+(\S+) \[\1 \.\.\.\]+", r"\1 ...", option[0]), _TYPED)
+    wide = max(len(typed) for typed, _ in every)
     for title, options in groups.items():
         lines += ["", title]
         for typed, says in options:
-            typed = re.sub(r"\{None\}\||None,|, --no-\S+", "", typed)
-            typed = re.sub(r"\[+(\S+) \[\1 \.\.\.\]+", r"\1 ...", typed)
             says = re.sub(r"\((default: (None|False)?|required|repeatable)\)$", "", " ".join(says.split()))
             says, _, default = says.strip().partition("(default: ")
             says, default = says.partition(". ")[0].rstrip(". "), f" [{default[:-1]}]" if default else ""
-            room = _WIDTH - _TYPED - 4 - len(default)
-            lines.append(f"  {cut(typed, _TYPED):{_TYPED}}  {cut(says, room)}{default}")
+            lines.append(f"  {typed:{wide}}  {cut(says, _columns() - wide - 4 - len(default))}{default}")
     return "\n".join([*lines, "", "With --verbose, all that there is to say of each option."])
 
 
