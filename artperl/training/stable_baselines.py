@@ -14,13 +14,13 @@ from artsim.common.extras import require_extra
 with require_extra("artperl.training.stable_baselines", extra="dev"):
     from stable_baselines3.common.vec_env import VecEnv
 
-from gymnasium.vector import VectorEnv
+from gymnasium.vector import AutoresetMode, VectorEnv
 
 Array = NDArray[Any]
 
 
 class StableBaselinesEnvs(VecEnv):
-    """Gymnasium's environments that are reset in the step that ends them, as a ``VecEnv``.
+    """Gymnasium's environments that are reset in the step that ends them, or that all end together, as a ``VecEnv``.
 
     Parameters
     ----------
@@ -47,6 +47,8 @@ class StableBaselinesEnvs(VecEnv):
         """Take them."""
         observed, reward, ended, truncated, info = self.envs.step(self._actions)
         done = ended | truncated
+        if done.all() and self.envs.metadata["autoreset_mode"] is AutoresetMode.DISABLED:
+            info["final_obs"], (observed, _) = observed, self.envs.reset()
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for i in np.flatnonzero(done):
             last = {name: values[i] for name, values in info["final_obs"].items()}

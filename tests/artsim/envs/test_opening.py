@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from PIL import Image
 
 import artsim.envs  # noqa: F401  # registers artsim/Opening-v0
 from artsim.envs.handles import STIFFNESS, HeldJoints, find_handles
-from artsim.envs.opening import CONTROL_STEP, OpeningVectorEnv
+from artsim.envs.opening import CONTROL_STEP, SPEED, OpeningVectorEnv
 from artsim.errors import ConfigError
 from artsim.families import make
 from artsim.physics import PhysicsOptions, Simulation
 from artsim.renderers import render
 from tests.conftest import installed
+from tests.programs import run_here
 
 ID = "artsim/Opening-v0"
 
@@ -116,6 +120,43 @@ def test_who_knows_the_state_opens_and_who_does_not_look_fails(task: Any) -> Non
         assert episode(envs, lambda constant=constant: constant)[1]["success"].mean() < 0.4
     envs.action_space.seed(0)
     assert episode(envs, envs.action_space.sample)[1]["success"].mean() < 0.1
+
+
+@pytest.mark.slow
+def test_stable_baselines_begins_anew_what_ends_together() -> None:
+    installed("stable_baselines3")
+    from artperl.training.stable_baselines import StableBaselinesEnvs
+
+    envs = StableBaselinesEnvs(OpeningVectorEnv(2, pool=1, observe="state", episode_length=3))
+    envs.reset()
+    for step in range(3):
+        seen, _, done, infos = envs.step(np.tile(np.float32([-0.1, 0, 0]), (2, 1)))
+        assert done.tolist() == [step == 2] * 2
+    last = np.stack([info["terminal_observation"]["hand"] for info in infos])
+    np.testing.assert_allclose(last[:, :3], [[-3 * 0.1 * SPEED * CONTROL_STEP, 0, 0]] * 2, atol=1e-6)
+    assert (seen["hand"][:, :3] == 0).all()
+
+
+@pytest.mark.slow
+def test_the_example_teaches_tries_and_shows(tmp_path: Path) -> None:
+    ppo = installed("stable_baselines3").PPO
+    few = {"seeds": 1, "objects": 8, "hands": 8, "episode-length": 30, "rounds": 2, "trials": 8}
+    words = [word for name, value in few.items() for word in (f"--{name}", value)]
+    done = run_here("examples/opening/main.py", tmp_path, *words)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout.splitlines()[-1])
+    assert told["oracle"] == 1.0
+    assert max(told["best constant"], told["random"]) < 0.5
+    (row,) = told["seeds"]
+    assert [steps for steps, _ in row["curve"]] == [0, 240, 480, 720, 960]
+    with Image.open(tmp_path / "opening_policy.webp") as film, Image.open(tmp_path / "opening_policy.png") as curve:
+        assert (film.n_frames, film.size) == (30, (800, 150))
+        assert curve.width > 500
+    envs = OpeningVectorEnv(2, pool=1)
+    seen, _ = envs.reset(seed=0)
+    action, _ = ppo.load(tmp_path / "policy_1.zip", device="cpu").predict(seen, deterministic=True)
+    assert action.shape == (2, 3)
+    assert not np.allclose(*action, atol=1e-3)  # it looks: other hands stand before other drawers
 
 
 def test_gymnasium_finds_nothing_wrong_and_equal_seeds_make_equal_episodes() -> None:
