@@ -23,7 +23,7 @@ HISTORY = (
 )  # fmt: skip
 """Words that say how something came about."""
 
-ENVIRONMENTS = {"artsim/Articulated-v0"}
+ENVIRONMENTS = {"artsim/Articulated-v0", "artsim/Opening-v0"}
 """Names of gymnasium that look like paths."""
 
 
