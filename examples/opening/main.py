@@ -9,6 +9,7 @@ improves it by rewards alone. The oracle, and policies that do not look, are tri
 """
 
 import json
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,7 +29,7 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
 from artperl.training.stable_baselines import StableBaselinesEnvs
 from artsim import ViewOptions
-from artsim.common.progress import say
+from artsim.common.progress import track
 from artsim.envs.opening import OpeningVectorEnv
 
 UNSEEN = 100_000
@@ -58,7 +59,7 @@ class Options:
     """Procedural categories: artsim generate-objects --help names them."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """One policy for each."""
-    objects: int = 200
+    objects: int = 400
     """To learn from, and as many others to be tried on, of each category."""
     hands: int = 64
     """Episodes at once."""
@@ -80,21 +81,16 @@ class PointNet(BaseFeaturesExtractor):
 
     def forward(self, seen: dict[str, torch.Tensor]) -> torch.Tensor:
         """(B, F) of B observations, in units of 0.25 m."""
-        cloud = torch.relu(self.points(4.0 * seen["points"]).amax(dim=1))
+        cloud = torch.relu(self.points(4.0 * seen["points"]).max(dim=1).values)
         return torch.cat([cloud, *(4.0 * seen[name] for name in self.told)], dim=1)
 
 
 def make_envs(options: Options, count: int, first_seed: int, **more: Any) -> OpeningVectorEnv:
     """Hands before objects whose seeds count from the first one."""
     return OpeningVectorEnv(
-        count,
-        task=options.task,
-        categories=options.categories,
-        pool=options.objects,
-        first_seed=first_seed,
-        episode_length=options.episode_length,
-        **more,
-    )
+        count, task=options.task, categories=options.categories, pool=options.objects, first_seed=first_seed,
+        episode_length=options.episode_length, **more,
+    )  # fmt: skip
 
 
 def success(policy: Policy, envs: OpeningVectorEnv) -> float:
@@ -154,26 +150,19 @@ def clone(model: PPO, envs: OpeningVectorEnv, kept: DictReplayBuffer, rate: floa
 def teach(options: Options, envs: OpeningVectorEnv, unseen: OpeningVectorEnv, seed: int) -> tuple[PPO, dict[str, Any]]:
     """A policy, and its successes with unseen objects over control steps."""
     hands = StableBaselinesEnvs(envs)
-    model = PPO(
-        "MultiInputPolicy",
-        hands,
-        n_steps=options.episode_length,
-        batch_size=BATCH,
-        n_epochs=4,
-        gamma=DISCOUNT,
-        gae_lambda=0.9,
-        learning_rate=1e-4,
-        target_kl=0.02,
-        policy_kwargs={"features_extractor_class": PointNet, "net_arch": [128, 128], "log_std_init": -1.6},
-        device="cpu",
-        seed=seed,
-    )
-    model.policy.log_std.requires_grad_(False)
-    envs.reset(seed=seed)
     of_round = options.hands * options.episode_length
+    shape = {"features_extractor_class": PointNet, "net_arch": [128, 128], "log_std_init": -1.6}
+    model = PPO(
+        "MultiInputPolicy", hands, n_steps=options.episode_length, batch_size=min(BATCH, of_round), n_epochs=4,
+        gamma=DISCOUNT, gae_lambda=0.9, learning_rate=1e-4, target_kl=0.02, policy_kwargs=shape, seed=seed,
+        device="cpu",
+    )  # fmt: skip
+    model.policy.log_std.requires_grad_(False)  # else cloning makes it larger than hands that must not slip can bear
+    envs.reset(seed=seed)
     kept = DictReplayBuffer(KEPT * of_round, hands.observation_space, hands.action_space, "cpu", options.hands)
     curve, seconds = [(0, success(learnt(model), unseen))], 0.0
-    for n in range(1, 2 * options.rounds + 1):
+    rounds = track(f"seed {seed}", range(1, 2 * options.rounds + 1), unit="round")
+    for n in rounds:
         way = "PPO" if n > options.rounds else "cloning"
         start = time.perf_counter()
         if way == "cloning":
@@ -183,7 +172,7 @@ def teach(options: Options, envs: OpeningVectorEnv, unseen: OpeningVectorEnv, se
         seconds += time.perf_counter() - start
         if n % max(1, options.rounds // PARTS) == 0:
             curve.append((n * of_round, success(learnt(model), unseen)))
-            say(f"seed {seed}, {way}: {curve[-1][0]:,} steps, {seconds:.0f} s, success {curve[-1][1]:.0%}")
+            rounds.set_postfix_str(f"{way}, success {curve[-1][1]:.0%}")
     cloned = dict(curve)[options.rounds * of_round]
     row = {"seed": seed, "cloned": cloned, "success": curve[-1][1], "seconds": round(seconds), "curve": curve}
     return model, row | {"steps per second": round(curve[-1][0] / seconds)}
@@ -237,7 +226,7 @@ def main(options: Options) -> None:
         rows.append(row)
     draw(rows, known, options, options.out / "opening_policy.png")
     film(learnt(model), options, options.out / "opening_policy.webp")
-    say(f"wrote {options.out}")
+    print(f"wrote {options.out}", file=sys.stderr)
     unseen.reset(seed=0)
     objects = len({id(handle.obj) for handle in unseen.handles})
     print(f"Success in {options.trials} episodes with {objects} unseen objects.\n")
