@@ -2,37 +2,26 @@
 
 Real objects of the dev half of PartNet-Mobility, 20 of two folders of furniture, are learnt as one category, as
 ``artperl train --objects FOLDER --name furniture`` does: 12 of them are learnt from, 4 choose the best estimator, and
-4 test it. Rows, on the same views of these 4:
-
-- *generic*: the estimator that comes with the package, which has seen no real object;
-- *from generic*: what the command makes, which starts from it;
-- *from random*: the same without that start.
-
-The last line is one JSON object, with minutes of one processor core.
+4 test it. Each row is of the same views of these 4, by what was learnt, and by ``generic``, from which it started and
+which has seen no real object. The last line is one JSON object, with the minutes of one processor core.
 """
 
 import json
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import tyro
 
-from artperl.evaluation.samples import TEST_SEEDS
-from artperl.evaluation.scoring import evaluate
-from artperl.evaluation.tables import summary
-from artperl.methods.estimator_files import load_estimator
-from artperl.training.options import changed, preset_of
-from artperl.training.run import Training
-from artperl.training.validation import unseen_samples
+from artperl.commands.train import Train
 from artsim.checks.realism import read_split
+from artsim.common.files import read_json
 from artsim.errors import ConfigError
 
 
 @dataclass(frozen=True)
 class Options:
-    """Which objects, and where the runs are."""
+    """Which objects, and where the run is."""
 
     folders: tuple[str, ...] = ("StorageFurniture", "Table")
     """Of PartNet-Mobility."""
@@ -56,31 +45,24 @@ def link_objects(options: Options) -> Path:
     return made
 
 
-def row(figures: dict[str, Any], minutes: float) -> dict[str, float]:
-    """What the table shows of the one category of a summary, per cent."""
-    (own,) = figures.values()
-    shares = {
-        "right": own["right"], "parts found": own["parts_found"], "points right": own["segmentation"],
-        "failures": own["failures"] / own["instances"], "IoU of the root": own["parts"][0]["iou_exact"]["mean"],
-    }  # fmt: skip
-    return {name: round(100.0 * share, 1) for name, share in shares.items()} | {"minutes": round(minutes, 1)}
-
-
 def main(options: Options) -> None:
-    """Measure and print."""
-    told = {"objects": [str(link_objects(options))], "name": "furniture", "categories": []}
-    own = changed(preset_of("full", "own"), told)
-    result, samples = dict[str, dict[str, float]](), []
-    for start in ("generic", None):
-        training = Training(replace(own, start_from=start), options.out / f"from_{start or 'random'}", workers=0)
-        figures = training.run()
-        result[f"from {start or 'random'}"] = row(figures, sum(training.context.state.seconds.values()) / 60.0)
-        samples = unseen_samples(training.context, own.test_views, TEST_SEEDS)
-    result["generic"] = row(summary(evaluate(load_estimator("generic"), samples, True)), 0.0)
-    print(f"{'':14s}" + "".join(f"{name:>17s}" for name in result["generic"]))
-    for name in ("generic", "from generic", "from random"):
-        print(f"{name:14s}" + "".join(f"{value:17g}" for value in result[name].values()))
-    print(json.dumps({"objects": options.objects, "steps": own.perception_steps, "views": len(samples), **result}))
+    """Train as the command does, which prints its table, and print what the docs show of it."""
+    out = options.out / "furniture"
+    Train(objects=(link_objects(options),), name="furniture", out=out, workers=0, threads=1).run()
+    split, seconds = read_json(out / "split.json", "split"), read_json(out / "seconds.json", "seconds")
+    result = {
+        "objects": {half: len(those) for half, those in split.items()},
+        "steps": read_json(out / "state.json", "state")["done"]["perception"],
+        "minutes": round(sum(seconds.values()) / 60.0, 1),
+        **{
+            name: {"views": own["instances"], **{
+                key: round(100.0 * own[key], 1) for key in ("right", "parts_found", "segmentation")
+            }}
+            for name, own in read_json(out / "figures.json", "figures").items()
+        },
+    }  # fmt: skip
+    print("\n".join(f"{name}: {value}" for name, value in result.items()))
+    print(json.dumps(result))
 
 
 if __name__ == "__main__":

@@ -70,11 +70,12 @@ class Evaluate(Figures):
             self.num_points, states=StateOptions(self.states), views=ViewOptions(preset=self.preset), noise=self.noise
         )
         parts = learnt.get("parts", "artimage")
-        categories = tuple(dict.fromkeys(self.category or learnt.get("categories", estimator.categories)))
+        named = learnt.get("name")
+        known = () if named else learnt.get("categories", estimator.categories)
+        categories = tuple(dict.fromkeys(self.category or known))
         if self.files:
             sources = find_sources(self.files, self.package_root)
             objects = [match_category(source.load(), categories, parts) for source in sources]
-            named = learnt.get("name")
             objects = [
                 replace(obj, category=named or obj.object_id) if named or obj.category == "unknown" else obj
                 for obj in objects

@@ -88,7 +88,7 @@ class Train(Figures):
     too, in other states and from other sides."""
     name: str | None = None
     """Learn the category that these objects are of: two fifths of them are held out, to choose the best estimator and
-    to test it. OUT/split.json says which."""
+    to test it. OUT/split.json says which. Every other object is one of --category, by default of generic's."""
     package_roots: Annotated[PackageRoots, tyro.conf.arg(name="package-root")] = field(default_factory=dict)
     """Folders that package:// names of their files stand for, where they are not found as they are; repeatable."""
     parts: Literal["artimage", "any"] | None = None
@@ -186,13 +186,15 @@ class Train(Figures):
         if self.name is not None:
             _check_name(self.name, self.objects)
         if self.objects:
-            if self.categories or self.real or self.parts == "artimage":
+            if (self.categories and self.name is None) or self.real or self.parts == "artimage":
                 raise ConfigError(
                     "given objects are learnt from alone, with all of their parts", "objects", "give no --category"
                 )
             views = max(preset.test_objects, _FILE_VIEWS)
-            changes |= {"categories": [], "parts": "any", "test_objects": views}
-        elif self.categories == ("all",):
+            changes |= {"parts": "any", "test_objects": views}
+            if self.name is None or self.preset not in (None, "own"):
+                changes.setdefault("categories", [])
+        if self.categories == ("all",):
             changes["categories"] = list(FAMILIES)
         return changed(preset, changes)
 

@@ -158,11 +158,18 @@ def _calibrated(
 
 
 def test(context: Context) -> dict[str, Any]:
-    """Test the best estimator on objects that had no say in which one that is; write its figures and a report."""
+    """Test the best estimator on objects that had no say in which one that is; write its figures and a report.
+
+    Beside those of a category of given objects stand the figures of the estimator that the run started from.
+    """
     out, best = context.folder.path, context.best()
     samples = unseen_samples(context, context.options.test_views, TEST_SEEDS)
     scored = evaluate(best, samples, context.progress)
     figures = summary(scored)
+    if context.options.name is not None and context.parent is not None:  # so that nobody takes what is worse
+        before = summary(evaluate(context.parent, samples, context.progress))
+        of = context.provenance["parents"][0]["name"]
+        figures |= {f"{category} by {of}": values for category, values in before.items()}
     about = dict(read_settings(context.folder.best)["about"])
     about.pop("validation", None)  # these figures chose this estimator, and are no measurement of it
     save_estimator(best, context.folder.best, {**about, "test": rounded(figures)})
@@ -188,7 +195,7 @@ def unseen_samples(context: Context, views: int, first_seed: int, noise: str | N
         Depth sensor; by default that of the options.
     """
     options = context.options
-    if not options.categories:
+    if options.objects:
         given = context.objects.given
         objects = given.test if first_seed == TEST_SEEDS else given.val
         return given_samples(context, objects, options.test_objects * views, first_seed, noise)

@@ -19,9 +19,9 @@ from artsim.loading.sources import find_sources
 from tests.conftest import BOX_LAPTOP
 
 TINY = TrainOptions(
-    categories=(), objects=("files",), name="mydoor", parts="any", max_parts=4, reference_points=48, width=16,
-    perception_steps=2, dense_steps=0, batch_size=4, num_points=96, box_views=0, validate_every=2, test_objects=2,
-    foreign_categories=1, validation_views=1, test_views=1,
+    categories=(), objects=("files",), name="mydoor", parts="any", max_parts=10, reference_points=48, width=40,
+    start_from="generic", perception_steps=2, dense_steps=0, batch_size=4, num_points=96, box_views=0,
+    validate_every=2, test_objects=2, foreign_categories=1, validation_views=1, test_views=1,
 )  # fmt: skip
 
 
@@ -91,7 +91,9 @@ def test_a_named_run_leaves_its_split_and_an_estimator_of_that_name(
     assert folder_of("mydoor") == out / "best"
     assert best.perception.votes  # another object of the category may have other parts
     assert set(best.base.object_ids) == {Path(file).parent.name for file in named["train"]}
-    assert "mydoor lid" in (out / "table.txt").read_text()
+    table = (out / "table.txt").read_text()
+    assert "mydoor lid" in table
+    assert "mydoor by generic lid" in table
     capsys.readouterr()
     verbs.Evaluate(Path("mydoor"), files=tuple(Path(file) for file in named["test"]), views=1).run()
     assert "mydoor lid" in capsys.readouterr().out
@@ -108,7 +110,7 @@ def test_a_named_run_leaves_its_split_and_an_estimator_of_that_name(
         ({"name": "mydoor"}, "no objects to name"),
         ({"name": "laptop", "objects": (Path("a"),)}, "comes with the package"),
         ({"name": "../door", "objects": (Path("a"),)}, "is no name"),
-        ({"name": "mydoor", "objects": (Path("a"),), "categories": ("laptop",)}, "learnt from alone"),
+        ({"objects": (Path("a"),), "categories": ("laptop",)}, "learnt from alone"),
     ],
 )
 def test_a_name_that_cannot_be_one_is_refused(options: dict[str, object], what: str) -> None:
