@@ -65,7 +65,9 @@ def estimator_fix(name: str) -> str:
     for of in shipped:
         if name in read_settings(WEIGHTS / of)["about"].get("options", {}).get("categories", ()):
             return f"use {of}, which covers {name} and comes with the package, or a folder that artperl train wrote"
-    return f"{name_fix(name, shipped)}, which come with the package, or a folder that artperl train wrote"
+    runs = sorted(path.parents[1].name for path in RUNS.glob(f"*/best/{SETTINGS}"))
+    where = "which come with the package, " + (f"and of {RUNS}, " if runs else "")
+    return f"{name_fix(name, [*shipped, *runs])}, {where}or a folder that artperl train wrote"
 
 
 _RENAMED = {"doubt": "expected_error", "foreign": "outlier_share"}
