@@ -209,7 +209,7 @@ def test_an_estimator_is_found_by_name_or_folder_or_run(tmp_path: Path) -> None:
 
 
 def test_help_lists_every_format(program: Program) -> None:
-    out, _ = program("--help")
+    out, _ = program("--help", "--verbose")
     words = (
         ".npy .npz .ply .pcd .xyz .txt .csv .obj .stl .off .png .tif .pgm .jpg BOP Open3D RealSense ROS NeRF .yaml"
         " --unit --camera --depth-scale --depth-kind --mask-id --mask-kind --pixel-center --image-id joint_limits"
