@@ -3,12 +3,13 @@
 import logging
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import tyro
 
 from artsim.common.outputs import check_output, write_output
 from artsim.common.program import Figures
-from artsim.errors import ConfigError
+from artsim.errors import ConfigError, DatasetError
 
 log = logging.getLogger(__name__)
 
@@ -23,12 +24,16 @@ class Score(Figures):
     Example: artsim dataset artsim-10k --splits test --out out/artsim-10k
 
     Then: artperl score predictions.json --data out/artsim-10k/test --out page.md
+
+    Of a dataset that an estimator learnt from: artperl score poses.jsonl --data out/first --split test
     """
 
     predictions: tyro.conf.Positional[tuple[Path, ...]]
     """Files of estimates, one for each method; a method has the name of its file."""
     data: Path
     """Folder of the dataset."""
+    split: Literal["train", "val", "test"] | None = None
+    """Score the samples of this split alone: test, for an estimator that learnt from train. By default all."""
     out: Path | None = None
     """Write the page, Markdown, to this file; by default it is printed."""
 
@@ -44,12 +49,15 @@ class Score(Figures):
             if path is not None:
                 check_output(path, self.predictions)
         read = [read_predictions(path) for path in self.predictions]
-        dataset = open_dataset(self.data)
+        dataset = open_dataset(self.data, self.split)
+        if not len(dataset):
+            raise DatasetError(f"its split {self.split} has no sample", self.data, "name another with --split")
         symmetric = symmetries_of(dataset)
         scored = {own.name: score_predictions(own, dataset, symmetric) for own in read}
         title = frozen_name(dataset) or f"{self.data.name}, no frozen dataset"
+        title += f", split {self.split}" if self.split else ""
         notes = [
-            f"{len(dataset)} views of {len(dataset.plan.objects)} objects. A view without an estimate is a failure: "
+            f"{len(dataset)} views of {len(dataset.all_planned)} objects. A view without an estimate is a failure: "
             "half a turn, one diagonal, no overlap.",
             "Right: every part within 10 degrees and 5 % of the diagonal. Errors of parts, up to symmetry.",
         ]

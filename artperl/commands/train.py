@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import logging
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -120,7 +120,8 @@ class Train(Figures):
     real: bool = False
     """Learn from real objects, too: every other one, of the half of ArtImage's frozen split that is not for testing."""
     dataset: Path | None = None
-    """Learn from the train split of a dataset that artsim generate wrote, instead of from fresh objects."""
+    """Learn from the train split of a dataset that artsim generate wrote, instead of from fresh clouds. By default its
+    categories are learnt, and the estimator is tested on fresh clouds with its noise, states and views."""
     start_from: Path | None = None
     """Folder of an estimator whose networks are trained further; by default they start at random."""
     noise: Literal["none", "kinect_v1", "d435", "azure", "gaussian3mm"] | None = None
@@ -142,7 +143,8 @@ class Train(Figures):
         recipe = None if self.recipe is None else Recipe.read(self.recipe)
         options = self._options(recipe)
         preset = self.preset or (recipe.preset if recipe else "quick")
-        name = recipe.name if recipe else "-".join(self.categories or ()) or Path((*options.objects, "laptop")[0]).stem
+        given = Path((*options.objects, options.dataset or "laptop")[0]).stem
+        name = recipe.name if recipe else "-".join(self.categories or ()) or given
         method = "" if options.method == "full" else f"{options.method}-"
         out = self.out or RUNS / (options.name or f"{name}-{method}{preset}")
         if recipe is None or not is_made(out, recipe):
@@ -194,9 +196,21 @@ class Train(Figures):
             changes |= {"parts": "any", "test_objects": views}
             if self.name is None or self.preset not in (None, "own"):
                 changes.setdefault("categories", [])
+        elif self.dataset is not None:
+            preset = _like_dataset(preset, self.dataset)
         if self.categories == ("all",):
             changes["categories"] = list(FAMILIES)
         return changed(preset, changes)
+
+
+def _like_dataset(options: TrainOptions, folder: Path) -> TrainOptions:
+    """Options with the categories, noise, states and views of a dataset."""
+    from artsim.datasets.dataset import open_dataset
+
+    plan = open_dataset(folder).plan
+    categories = tuple(dict.fromkeys(planned.category for planned in plan.objects))
+    sample = replace(plan.sample, renderer="raycast", images=(), details=False)
+    return replace(options, categories=categories, sample=sample)
 
 
 def _check_name(name: str, objects: tuple[Path, ...] | None) -> None:

@@ -138,7 +138,7 @@ def _scored(estimate: Estimate | None, sample: Sample, symmetric: Symmetries) ->
 
 def symmetries_of(dataset: Dataset) -> Symmetries:
     """In what ways the objects of a dataset look the same."""
-    planned = track("symmetries", dataset.plan.objects, unit="object")
+    planned = track("symmetries", dataset.all_planned, unit="object")
     return object_symmetries(dataset.objects[each.file] for each in planned)
 
 

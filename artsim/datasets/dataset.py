@@ -5,7 +5,7 @@ from __future__ import annotations
 import bisect
 import os
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -105,7 +105,7 @@ class Dataset:
 
     def __repr__(self) -> str:
         split = "" if self.split is None else f", split={self.split!r}"
-        return f"<Dataset {self.storage.place!r}{split}: {len(self)} samples of {len(self.plan.objects)} objects>"
+        return f"<Dataset {self.storage.place!r}{split}: {len(self)} samples of {len(self.all_planned)} objects>"
 
     def __iter__(self) -> Iterator[Sample]:
         return (self[i] for i in range(len(self)))
@@ -131,6 +131,11 @@ class Dataset:
     def object_key(self, i: int) -> str:
         """Name, unique in the dataset, of the object that sample ``i`` shows, without reading it."""
         return self.planned(self._place(i)[1]).key
+
+    @property
+    def all_planned(self) -> Sequence[PlannedObject]:
+        """What the plan says of the objects of this split."""
+        return self.plan.objects if self.split is None else self.plan.objects_of[self.split]
 
     def planned(self, index: int) -> PlannedObject:
         """What the plan says of the object that the sample of an index shows.

@@ -15,7 +15,7 @@ from artperl.commands.score import Score
 from artperl.evaluation.metrics import true_poses
 from artsim import Dataset
 from artsim.datasets.plan import SampleOptions
-from artsim.errors import ConfigError
+from artsim.errors import ConfigError, DatasetError
 from artsim.loading.sources import family_sources
 from artsim.observing.sample import Sample
 from tests.artsim.datasets.conftest import quick_workers  # noqa: F401
@@ -42,8 +42,8 @@ def figures(dataset: Dataset, tmp_path: Path, **files: str) -> dict[str, Any]:
     for name, text in files.items():
         (tmp_path / f"{name}.json").write_text(text)
     paths = tuple(tmp_path / f"{name}.json" for name in files)
-    Score(paths, dataset.folder, tmp_path / "page.md", tmp_path / "figures").run()
-    figures: dict[str, Any] = json.loads((tmp_path / "figures").read_text())
+    Score(paths, dataset.folder, out=tmp_path / "page.md", json=tmp_path / "figures.json").run()
+    figures: dict[str, Any] = json.loads((tmp_path / "figures.json").read_text())
     return figures
 
 
@@ -66,6 +66,22 @@ def test_methods_stand_side_by_side_with_their_errors(dataset: Dataset, tmp_path
     page = (tmp_path / "page.md").read_text()
     assert page.index("| perfect | 4 | 0 | 100.0") < page.index("| turned | 4 | 0 | 100.0")
     assert "no frozen dataset" in page
+
+
+@pytest.mark.slow
+def test_a_split_is_scored_alone(tmp_path: Path) -> None:
+    out, sample = tmp_path / "out", SampleOptions(num_points=32)
+    shares = (0.6, 0, 0.4)
+    artsim.generate(family_sources(("laptop",), 3), out, 6, sample=sample, splits=shares, workers=1, progress=False)
+    dataset, test = artsim.open_dataset(out), artsim.open_dataset(out, "test")
+    poses, page, found = tmp_path / "poses.json", tmp_path / "page.md", tmp_path / "figures.json"
+    poses.write_text(json.dumps([truth(s) for s in test]))
+    for split, views, failed in (("test", test, 0), (None, dataset, len(dataset) - len(test))):
+        Score((poses,), out, split, page, json=found).run()
+        assert json.loads(found.read_text())["poses"]["laptop"]["failures"] == failed
+        assert f"{len(views)} views of {len({s.object_id for s in views})} objects" in page.read_text()
+    with pytest.raises(DatasetError, match="split val has no sample"):
+        Score((poses,), out, "val").run()
 
 
 def test_absent_estimates_and_those_with_other_parts_are_failures(dataset: Dataset, tmp_path: Path) -> None:

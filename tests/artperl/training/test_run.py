@@ -32,6 +32,7 @@ from artsim.datasets.plan import SampleOptions
 from artsim.errors import ConfigError, DatasetError
 from artsim.loading.sources import family_sources
 from artsim.loading.urdf import load
+from artsim.model.draws import StateOptions
 
 pytestmark = pytest.mark.slow
 
@@ -256,6 +257,17 @@ def test_a_run_on_a_dataset_ends_like_any_other(recorded: Path, tmp_path: Path) 
     Training(replace(options, dense_steps=0), tmp_path, workers=0, progress=False).run()
     assert "laptop lid" in (tmp_path / "table.txt").read_text()
     assert read_settings(tmp_path / "best")["about"]["options"]["dataset"] == str(recorded)
+
+
+def test_a_dataset_says_what_is_learnt_from_it_and_how_it_is_tested(tmp_path: Path) -> None:
+    sample = SampleOptions(num_points=64, noise="d435", states=StateOptions("rest"), images=("depth",))
+    folder = generate(family_sources(["drawer", "laptop"], 1), tmp_path / "of", num_samples=4, sample=sample).folder
+    options = verbs.Train(dataset=folder)._options(None)
+    assert options.categories == ("drawer", "laptop")
+    assert options.sample == replace(sample, images=())
+    options = verbs.Train(dataset=folder, categories=("laptop",), noise="azure")._options(None)
+    assert options.categories == ("laptop",)
+    assert options.sample == replace(sample, images=(), noise="azure")
 
 
 def test_objects_of_files_are_learnt_from_and_tested_on(
