@@ -121,6 +121,7 @@ class Estimate(EstimateOptions):
             )
 
     def _estimate_one(self, estimator: Method) -> None:
+        from artperl.core.confidence import LIKELY
         from artperl.evaluation.estimate_page import page
         from artperl.inputs import read_cloud
         from artperl.methods.views import estimate_views, merge_clouds
@@ -147,6 +148,11 @@ class Estimate(EstimateOptions):
             write_output(self.view, page(result, points, f"{file.name}: {self.category}").encode())
         for text in result.warnings:
             log.warning(text)
+        if result.confidence < LIKELY:
+            log.warning(
+                "the estimate is more likely wrong than right. Fix: look at it with --view; try another mask or view, "
+                "or --seen-from"
+            )
         if self.out == STDOUT:
             print(json.dumps(result.to_dict() | {"notes": notes}))
             return

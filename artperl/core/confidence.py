@@ -7,6 +7,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+LIKELY = 0.5
+"""Confidence from which an estimate is worth showing: it is the probability of being right, so that most of the others
+are wrong."""
+
 
 @dataclass(frozen=True)
 class Symptoms:

@@ -23,6 +23,8 @@ MASK_FILES = (
 )  # fmt: skip
 _MAX_JSON_BYTES = 64_000_000
 """All masks of one image take one or two."""
+_TOLD = 8
+"""Masks whose areas an error names: more do not fit a line."""
 _MOST_SIDE = 16_384
 """Pixels."""
 _FIX = "give a PNG that is black where the object is not, or .npy of (H, W)"
@@ -104,7 +106,7 @@ def _of_run_lengths(path: Path, mask_id: str | None) -> Mask:
     entries = content if isinstance(content, list) else []
     if len(entries) != 1 and (mask_id is None or not mask_id.isdigit() or int(mask_id) >= len(entries)):
         fix = f"choose one: --mask-id 0 to {len(entries) - 1}" if entries else _FIX
-        raise ConfigError(f"it holds {len(entries)} masks", path, fix)
+        raise ConfigError(f"it holds {len(entries)} masks{_areas(entries)}", path, fix)
     entry = entries[int(mask_id or 0) if len(entries) > 1 else 0]
 
     def decoded() -> Mask:
@@ -115,6 +117,14 @@ def _of_run_lengths(path: Path, mask_id: str | None) -> Mask:
         return Mask(decode_segmentation(runs, width, height))
 
     return guard(decoded, path, "mask", _FIX)
+
+
+def _areas(entries: list[Any]) -> str:
+    """How large the first masks are, where their entries say so, as Segment Anything's do."""
+    areas = [entry.get("area") for entry in entries[:_TOLD] if isinstance(entry, dict)]
+    if not areas or not all(isinstance(area, int) for area in areas):
+        return ""
+    return f", of {', '.join(map(str, areas))}{' ...' if len(entries) > _TOLD else ''} pixels"
 
 
 def _of_array(values: NDArray[Any], path: Path, mask_id: str | None, kind: MaskKind) -> Mask:

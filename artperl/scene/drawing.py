@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from artperl.core.confidence import LIKELY
 from artperl.core.estimate import Estimate
 from artperl.scene.estimator import SceneEstimate
 from artsim.common.names import printable
@@ -18,9 +19,6 @@ Rectangle: TypeAlias = "tuple[float, float, float, float]"
 
 _OVER = 2  # drawn larger, then reduced: smooth lines
 _NEAREST = 1e-3  # metres before the camera: what comes nearer is not drawn
-_SURE = 0.5
-"""Confidence from which an estimate is drawn: it is the probability of being right, so that most of the others are
-wrong."""
 _AXIS = (235, 25, 45)
 _LUMA = (0.299, 0.587, 0.114)
 _BRIGHT = 140
@@ -67,12 +65,12 @@ def draw_scene(rgb: NDArray[np.uint8], K: NDArray[np.float64], scene: SceneEstim
     canvas = Image.fromarray(rgb).resize((width * _OVER, height * _OVER), Image.Resampling.BILINEAR)
     draw = ImageDraw.Draw(canvas)
     for number, obj in enumerate(scene.objects):
-        if obj.estimate is not None and obj.estimate.confidence >= _SURE:
+        if obj.estimate is not None and obj.estimate.confidence >= LIKELY:
             _draw_boxes(draw, obj.estimate, camera, number)
             _draw_axes(draw, obj.estimate, camera)
     taken: list[Rectangle] = []
     for number, obj in enumerate(scene.objects):  # on top of all lines
-        unsure = "" if obj.estimate is None or obj.estimate.confidence >= _SURE else ", not drawn"
+        unsure = "" if obj.estimate is None or obj.estimate.confidence >= LIKELY else ", not drawn"
         sure = "no estimate" if obj.estimate is None else f"{100 * obj.score:.0f} %{unsure}"
         text = f"{number} {printable(obj.detection.category, 40)} {sure}"
         taken.append(_label(draw, obj.detection.box, text, number, height // 20, taken))

@@ -12,17 +12,18 @@ from tqdm import tqdm
 
 from artsim.common.messages import messages_shown, note
 
-EVERY = 60.0
-"""Seconds between two lines of a log."""
+FIRST, EVERY = 10.0, 60.0
+"""Seconds until the first line of a log, so that nobody takes the work for stuck; and between two lines."""
 
 
 class Lines:
-    """As much of a tqdm bar as is used here, for a log: a line a minute on standard error, none of shorter work."""
+    """What is used here of a tqdm bar, for a log: a line after ten seconds, then one a minute, on standard error."""
 
     def __init__(self, description: str, items: Iterable[Any] | None, total: int | None, initial: int, unit: str):
         self.n: float = initial
-        self._items, self._postfix, self._said = items, "", False
-        self._start = self._last = monotonic()
+        self._items, self._postfix, self._said = items, "", self.n
+        self._start = monotonic()
+        self._next = self._start + FIRST
         self._shape = {"total": total, "initial": initial, "prefix": description, "unit": unit, "ncols": 0}
 
     def __iter__(self) -> Iterator[Any]:
@@ -44,18 +45,17 @@ class Lines:
     def update(self, n: float = 1) -> None:
         """So much more is done."""
         self.n += n
-        if monotonic() >= self._last + EVERY:
+        if monotonic() >= self._next:
             self._say()
 
     def close(self) -> None:
         """Say how far it came, if lines were said before."""
-        if self._said:
+        if self._next > self._start + FIRST and self.n != self._said:
             self._say()
-            self._said = False
 
     def _say(self) -> None:
-        self._last, self._said = monotonic(), True
-        elapsed = self._last - self._start
+        elapsed = monotonic() - self._start
+        self._next, self._said = self._start + elapsed + EVERY, self.n
         line = tqdm.format_meter(n=self.n, elapsed=elapsed, postfix=self._postfix or None, **self._shape)
         note(line.strip())
 

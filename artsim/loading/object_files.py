@@ -57,11 +57,10 @@ def find_urdf(path: Path) -> Path:
         macros = sorted(path.glob("*.xacro"))
         if macros:
             raise xacro_error("the folder holds no URDF file, but macros", macros[0])
-        raise AssetError(
-            f"the folder holds no URDF file, nor any of {', '.join(OTHER_FILES)}",
-            path,
-            f"pass {_KINDS}, or a folder with a mobility.urdf or one *.urdf",
-        )
+        names = ("mobility.urdf", *OTHER_FILES)
+        below = next((file.parent for name in names for at in ("*", "*/*") for file in path.glob(f"{at}/{name}")), None)
+        fix = f"pass {_KINDS}, or a folder with a mobility.urdf or one *.urdf" + (f", such as {below}" if below else "")
+        raise AssetError(f"the folder holds no URDF file, nor any of {', '.join(OTHER_FILES)}", path, fix)
     raise AssetError(f"the folder holds {len(found)} URDF files", path, f"pass one of them, such as {found[0].name}")
 
 

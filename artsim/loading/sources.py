@@ -63,7 +63,9 @@ def family_sources(
     unknown = sorted(set(categories) - FAMILIES.keys())
     if unknown:
         raise ConfigError(
-            f"there is no category {', '.join(unknown)}", "categories", name_fix(unknown[0], [*sorted(FAMILIES), "all"])
+            f"there is no category {', '.join(unknown)}",
+            "categories",
+            f"{name_fix(unknown[0], [*sorted(FAMILIES), 'all'])}; artsim families describes them",
         )
     if objects_per_category < 1:
         raise ConfigError(f"{objects_per_category} is not a count", "objects_per_category", "use 1 or more")

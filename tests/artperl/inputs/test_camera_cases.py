@@ -16,6 +16,7 @@ from artperl.inputs.intrinsics import Intrinsics, read_camera
 from artperl.inputs.intrinsics_formats import Hints
 from artperl.inputs.masks import read_mask
 from artsim.errors import ConfigError
+from artsim.formats.coco import run_lengths
 
 CASES = Path(__file__).parents[2] / "cases" / "second"
 SIZE = (640, 480)
@@ -194,6 +195,16 @@ def test_soft_masks_are_read_over_half_and_said(tmp_path: Path, name: str, value
 def test_stacks_of_logits_are_read_over_half(tmp_path: Path) -> None:
     np.save(tmp_path / "sam.npy", np.stack([_soft(), -_soft(), _soft() - 5.0, _soft()]))
     np.testing.assert_array_equal(read_mask(tmp_path / "sam.npy", "2").shown, _soft() > 5.0)
+
+
+def test_masks_of_segment_anything_are_told_by_their_areas(tmp_path: Path) -> None:
+    masks = [np.zeros((48, 64), bool) for _ in range(2)]
+    masks[0][:4, :5], masks[1][10:20, 10:13] = True, True
+    entries = [{"segmentation": {"size": [48, 64], "counts": run_lengths(m)}, "area": int(m.sum())} for m in masks]
+    (tmp_path / "sam.json").write_text(json.dumps({"annotations": entries}))
+    with pytest.raises(ConfigError, match=r"it holds 2 masks, of 20, 30 pixels.*--mask-id 0 to 1"):
+        read_mask(tmp_path / "sam.json")
+    np.testing.assert_array_equal(read_mask(tmp_path / "sam.json", "1").shown, masks[1])
 
 
 def test_numbers_of_objects_are_no_greys(tmp_path: Path) -> None:

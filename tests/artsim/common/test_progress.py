@@ -16,7 +16,7 @@ from artsim.common.progress import Lines, say, track
 SCRIPT = """
 import time
 from artsim.common import progress
-progress.EVERY = 0.05
+progress.FIRST = progress.EVERY = 0.05
 with progress.track("views", total=4, initial=1, unit="view") as bar:
     for _ in range(3):
         time.sleep(0.12)
@@ -34,19 +34,25 @@ def clock(monkeypatch):
     return now
 
 
-def test_a_log_gets_a_line_a_minute_and_one_at_the_end(clock, capsys):
+def test_a_log_gets_a_line_soon_then_one_a_minute_and_one_at_the_end(clock, capsys):
     for _ in track("objects", range(330), unit="object"):
         clock[0] += 1.0
     lines = capsys.readouterr().err.splitlines()
-    assert [line.split()[2].split("/")[0] for line in lines] == ["60", "120", "180", "240", "300", "330"]
+    assert [line.split()[2].split("/")[0] for line in lines] == ["10", "70", "130", "190", "250", "310", "330"]
     assert all(line.startswith("objects:") for line in lines)
-    assert "60/330 [01:00<04:30" in lines[0]
+    assert "70/330 [01:10<04:20" in lines[1]
+
+
+def test_the_last_line_comes_once(clock, capsys):
+    for _ in track("scenes", range(1)):
+        clock[0] += 65.0
+    assert len(capsys.readouterr().err.splitlines()) == 1
 
 
 def test_short_work_says_nothing_in_a_log(clock, capsys):
     with track("samples", total=10) as bar:
         for _ in range(10):
-            clock[0] += 5.0
+            clock[0] += 0.9
             bar.update()
     assert isinstance(bar, Lines)
     assert bar.n == 10
@@ -83,8 +89,8 @@ def test_a_file_gets_lines(tmp_path):
     assert "\r" not in text
     assert lines[0].startswith("views:  50% 2/4")
     assert lines[0].endswith("all well]")
-    assert lines[-2] == "a result"
-    assert lines[-1].startswith("views: 100% 4/4")
+    assert lines[-1] == "a result"
+    assert lines[-2].startswith("views: 100% 4/4")
 
 
 def test_a_terminal_gets_a_bar():

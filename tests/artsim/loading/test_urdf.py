@@ -201,6 +201,12 @@ def outside_by_link(folder: Path) -> Path:
     return write_urdf(inside, '<mesh filename="mesh.obj"/>')
 
 
+def of_several(folder: Path) -> Path:
+    (folder / "drawer" / "7").mkdir(parents=True)
+    (folder / "drawer" / "7" / "mobility.xml").write_text("<mujoco/>")
+    return folder
+
+
 def two_files(folder: Path) -> Path:
     for name in ("one", "two"):
         (folder / f"{name}.urdf").write_text(BOX_LAPTOP)
@@ -221,6 +227,7 @@ HINGE = joint("j", "a", "b")
 BAD: dict[str, tuple[Callable[[Path], Path], str]] = {
     "no such path": (lambda folder: folder / "nowhere", "no such file or folder"),
     "folder without a URDF": (lambda folder: folder, "holds no URDF file"),
+    "folder of several objects": (of_several, r"holds no URDF file.*such as .*drawer/7"),
     "folder with two": (two_files, "holds 2 URDF files"),
     "empty file": (with_bytes(b""), "the file is empty"),
     "not XML": (with_bytes(b"hello"), "not well-formed XML"),
