@@ -21,7 +21,8 @@ class Lines:
 
     def __init__(self, description: str, items: Iterable[Any] | None, total: int | None, initial: int, unit: str):
         self.n: float = initial
-        self._items, self._postfix, self._said = items, "", self.n
+        self._items, self._postfix = items, ""
+        self._said: float = initial
         self._start = monotonic()
         self._next = self._start + FIRST
         self._shape = {"total": total, "initial": initial, "prefix": description, "unit": unit, "ncols": 0}
