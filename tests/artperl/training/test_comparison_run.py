@@ -107,7 +107,7 @@ def test_the_arm_has_seven_parts_in_a_chain_and_all_of_its_methods_learn_from_it
     options = ComparisonOptions("robotarm")
     for method in options.of_methods:
         learning = training_options(options, "robot_arm", method, tmp_path)
-        assert learning.files == (str(tmp_path / "arm"),)
+        assert learning.objects == (str(tmp_path / "arm"),)
         assert learning.noisy > 0.0
         assert learning.degraded > 0.0  # test clouds are cut out by masks that are not exact
         assert learning.method == method
