@@ -228,6 +228,9 @@ def run_program(verbs: Verbs, program: str, description: str = "") -> None:
     words, every = _with_stdout(sys.argv[1:]), [verb for group in verbs.values() for verb in group]
     if isinstance(sys.stdout, io.TextIOWrapper):  # a terminal need not know every character
         sys.stdout.reconfigure(errors="backslashreplace")
+    names = {*map(verb_name, every)}
+    if len(every) > 1 and words and not words[0].startswith("-") and words[0] not in names:
+        words = words[:1]  # a slip is said, whether help is asked for or not
     first, asked = _class_of(every[0]), {"-h", "--help"} & {*words}
     told = inspect.cleandoc(first.__doc__ if len(every) == 1 else description)
     start, log = time.monotonic(), logging.getLogger(first.__module__.partition(".")[0])
@@ -237,7 +240,7 @@ def run_program(verbs: Verbs, program: str, description: str = "") -> None:
                 print(f"{program} {version('artsim')}")
             elif words[:1] == ["--completion"]:
                 print(_completion(parser_of(verbs), program, "".join(words[1:2])))
-            elif len(every) > 1 and (not words or asked) and not {*map(verb_name, every)} & {*words}:
+            elif len(every) > 1 and (not words or asked) and not names & {*words}:
                 print(_overview(verbs, program, description))
             elif asked and "--verbose" not in words:
                 print(_brief(_printed(parser_of(verbs), program, words, told)))

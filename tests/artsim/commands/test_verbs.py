@@ -83,6 +83,14 @@ def test_a_mistyped_option_is_pointed_out() -> None:
     assert "Traceback" not in result.stderr
 
 
+@pytest.mark.parametrize("words", [("genrate",), ("genrate", "--help"), ("",)])
+def test_a_mistyped_command_is_pointed_out(words: tuple[str, ...]) -> None:
+    result = run(ARTSIM, *words)
+    assert result.returncode == 2
+    assert "generate" in result.stderr
+    assert "Traceback" not in result.stderr
+
+
 def test_errors_are_one_line_and_exit_with_2(tmp_path: Path) -> None:
     broken = tmp_path / "broken.urdf"
     broken.write_text("<robot>")
