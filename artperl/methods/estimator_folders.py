@@ -25,7 +25,7 @@ def folder_of(name: str | Path, method: str = "full") -> Path:
     One that comes with the package is not hidden by a folder of that name without any.
     """
     own, shipped = Path(name), WEIGHTS / ("" if method == "full" else method) / _FORMER_ESTIMATORS.get(str(name), name)
-    if shipped.is_dir() and not (own / SETTINGS).is_file():
+    if shipped != own and shipped.is_dir() and not (own / SETTINGS).is_file():  # own, where the name is a whole path
         return shipped
     places = (own, own / "best", RUNS / name / "best")
     return next((place for place in places if (place / SETTINGS).is_file()), own)

@@ -98,7 +98,7 @@ def test_processes_of_a_pool_say_it_as_the_program_does(capfd: pytest.CaptureFix
 
 
 def test_quiet_work_shows_no_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("artsim.common.progress.EVERY", 0.0)
+    monkeypatch.setattr("artsim.common.progress.FIRST", 0.0)
     with Messages(quiet=True).shown():
         assert list(track("objects", range(3))) == [0, 1, 2]
     assert capsys.readouterr().err == ""
