@@ -7,12 +7,12 @@ wheel=$(realpath "$1")
 shift
 [ $# -gt 0 ] || set -- python3.10 python3.11 python3.12 python3.13
 
-# Training and the demo, which take minutes, are left to `make release`.
+# Training and the demo, which take minutes, are left to `make release`; `make` is the repository's.
 readme='
 import re, subprocess, sys
 from importlib.metadata import metadata
 for kind, block in re.findall(r"^```(\w+)\n(.*?)^```$", metadata("artsim").get_payload(), re.M | re.S):
-    if kind == "sh" and "pip install" not in block:
+    if kind == "sh" and "pip install" not in block and not block.startswith("make "):
         lines = [line for line in block.splitlines() if not re.match("artperl (train|demo)", line)]
         subprocess.run(["bash", "-exc", "\n".join(lines)], check=True)
     elif kind == "python":
