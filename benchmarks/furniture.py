@@ -58,8 +58,8 @@ _DEGREES, _DIAGONALS = 10.0, 0.05
 
 
 @dataclass(frozen=True)
-class Options:
-    """Which objects, how often each is seen, and what the estimator is told."""
+class Views:
+    """Which objects, and how often each is seen."""
 
     categories: tuple[str, ...] = CATEGORIES
     estimator: str = "generic"
@@ -67,6 +67,12 @@ class Options:
     """Of each object."""
     procedural: int = 0
     """Procedural test objects of each category, instead of the real ones of the dev half."""
+
+
+@dataclass(frozen=True)
+class Options(Views):
+    """Views, and what the estimator is told."""
+
     told: tuple[Told, ...] = get_args(Told)
 
 
@@ -157,10 +163,11 @@ def real(category: str) -> list[ArticulatedObject]:
     return list(real_objects(category, Path(folder), split, "dev"))
 
 
-def tested(category: str, views: int, procedural: int) -> tuple[list[Sample], dict[str, LooksSame]]:
-    """Views of a category's objects, real ones of the dev half or so many procedural ones; how they look the same."""
-    objects = objects_of([category], procedural, TEST_SEEDS, "any") if procedural else real(category)
-    return samples_of(objects, views), object_symmetries(objects)
+def tested(category: str, options: Views) -> tuple[list[Sample], dict[str, LooksSame]]:
+    """Views of a category's objects, and how they look the same."""
+    made = options.procedural
+    objects = objects_of([category], made, TEST_SEEDS, "any") if made else real(category)
+    return samples_of(objects, options.views), object_symmetries(objects)
 
 
 def measure(estimator: Estimator, samples: Sequence[Sample], same: dict[str, LooksSame], told: Told) -> dict[str, Any]:
@@ -205,7 +212,7 @@ def main(options: Options) -> None:
     columns = ("parts", *CAUSES, "found", "views right", "other number", "AUROC", "off")
     print(f"{'%':20s}{'told':9s}" + "".join(f"{name:>13s}" for name in columns))
     for category in options.categories:
-        samples, same = tested(category, options.views, options.procedural)
+        samples, same = tested(category, options)
         for told in options.told:
             row = result[category][told] = measure(estimator, samples, same, told)
             print(f"{category:20s}{told:9s}" + "".join(f"{row.get(name, 0):13g}" for name in columns), flush=True)

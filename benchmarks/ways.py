@@ -32,7 +32,7 @@ from artperl.perception.preprocess import Cloud
 from artsim.common.progress import track
 from artsim.errors import ArtsimError
 from artsim.observing.sample import Sample
-from benchmarks.furniture import CATEGORIES, SEEN, SHUT, Array, openness, tested
+from benchmarks.furniture import SEEN, SHUT, Array, Views, openness, tested
 
 FITTED = ("storage_furniture", "drawer", "dishwasher")
 """Categories with fronts that the estimator has learnt."""
@@ -41,15 +41,10 @@ _HELD = 0.3
 
 
 @dataclass(frozen=True)
-class Options:
-    """Which objects, and how often each is seen."""
+class Options(Views):
+    """Views, or what to fit to."""
 
-    categories: tuple[str, ...] = CATEGORIES
-    estimator: str = "generic"
     views: int = 4
-    """Of each object."""
-    procedural: int = 0
-    """Procedural test objects of each category, instead of the real ones of the dev half."""
     fit: int = 0
     """Procedural objects of each of :data:`FITTED` to fit constants to, instead of measuring."""
 
@@ -146,7 +141,7 @@ def main(options: Options) -> None:
                "shut, likeliest two")  # fmt: skip
     print(f"{'%':20s}" + "".join(f"{name:>21s}" for name in columns))
     for category in options.categories:
-        found = list(parts_told(telling, tested(category, options.views, options.procedural)[0]))
+        found = list(parts_told(telling, tested(category, options)[0]))
         row = result[category] = measure(found)
         print(f"{category:20s}" + "".join(f"{row.get(name, 0):21g}" for name in columns), flush=True)
     print(json.dumps(result))

@@ -16,7 +16,7 @@ from torch import Tensor
 
 from artperl.core.labels import label_log_odds
 from artperl.core.part_order import visible_order
-from artperl.core.ways import way_distances
+from artperl.core.ways import WAYS, way_distances
 from artperl.perception.network import Perceived, Votes
 from artsim.common.compiled import compiled
 
@@ -81,9 +81,9 @@ def _group(place: Array, box: Array, joint: Array, level_log_odds: Array) -> dic
         depth += [deep] * len(found)
     boxes = np.stack([np.median(box[own], axis=0) for own in members])
     joints = np.stack([np.median(joint[0, own], axis=0) for own in members])
-    ways = np.array([
-        [way_distances(votes[own], boxes[k, 3:]) for votes in joint] for k, own in enumerate(members)
-    ]).swapaxes(1, 2)  # fmt: skip
+    ways = np.zeros((len(members), len(WAYS), 2))
+    for k, own in enumerate(members[1:], start=1):  # the root does not open
+        ways[k] = np.transpose([way_distances(votes[own], boxes[k, 3:]) for votes in joint])
     joints[0] = 0.0
     parents = _parents(depth, boxes)
     order = visible_order(parents, boxes[:, :3], boxes[:, 3:])

@@ -1,7 +1,7 @@
 """OP-Align: one ``.npz`` for each cloud, with the pose of every part and the line of every joint.
 
-Its loader finds them as ``<category>_output/<split>/<object>/<view>/input_2/<view>.npz``. Each holds one pickled
-dictionary, which NumPy reads with ``allow_pickle=True``. :func:`read_op_align` reads it without running what it says.
+Its loader finds them as ``<category>_output/<split>/<object>/<view>/input_2/<view>.npz``. The layout wants one pickled
+dictionary in each. :func:`read_op_align` reads it with functions of its own, and runs nothing that a file names.
 """
 
 import io
@@ -27,10 +27,8 @@ from artsim.runs.tasks import Output
 _KEYS = {"pc": 3, "color": 3, "detection": 0, "segmentation": 0, "part": 15, "joint": 6}
 """Width of each array; 0 of one number a point."""
 _GREY = 0.5
-_ALLOWED = {("numpy", "ndarray"), ("numpy", "dtype"), ("_codecs", "encode")} | {
-    (f"numpy.{core}.multiarray", "_reconstruct") for core in ("core", "_core")
-}
-"""All that a dictionary of arrays needs of Python."""
+_NDARRAY = "an array"
+"""Stands for NumPy's class: nothing makes an array of a size that a file names."""
 
 
 class OpAlignFormat(Format):
@@ -96,13 +94,30 @@ def read_op_align(path: str | Path) -> dict[str, NDArray[Any]]:
 
 
 class _Arrays(pickle.Unpickler):
-    """Reads dictionaries of arrays, and refuses all else that a pickle may name."""
+    """Reads dictionaries of arrays. All that a file names of Python is one of the functions here, or refused."""
 
     def find_class(self, module: str, name: str) -> Any:
         """What a name stands for, of those that arrays need."""
-        if (module, name) not in _ALLOWED:
+        known = {
+            "numpy.ndarray": _NDARRAY, "numpy.dtype": np.dtype, "_codecs.encode": _latin1,
+            "numpy.core.multiarray._reconstruct": _empty, "numpy._core.multiarray._reconstruct": _empty,
+        }  # fmt: skip
+        if f"{module}.{name}" not in known:
             raise pickle.UnpicklingError(f"it names {module}.{name:.60}")
-        return super().find_class(module, name)
+        return known[f"{module}.{name}"]
+
+
+def _empty(kind: object, shape: object, code: object) -> NDArray[Any]:
+    """The empty array that NumPy's pickles begin with: what fills it is in the file."""
+    if kind is not _NDARRAY or shape != (0,):
+        raise pickle.UnpicklingError(f"its array begins as {shape}")
+    return np.empty(0)
+
+
+def _latin1(text: str, encoding: str) -> bytes:
+    if encoding != "latin1":
+        raise pickle.UnpicklingError(f"it names the encoding {encoding:.20}")
+    return text.encode("latin1")
 
 
 def _checked(array: Any, width: int, name: str) -> NDArray[Any]:

@@ -150,7 +150,20 @@ class Harmful:
         return os.mkdir, ("harmed",)
 
 
-@pytest.mark.parametrize("content", [Harmful(), {"pc": Harmful()}, {"pc": np.zeros((3, 3))}, [1, 2], "text"])
+class Huge:
+    """An array of 8 TB in a file of 400 bytes."""
+
+    def __init__(self, maker: Any, *words: Any):
+        self.made = maker, words
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return self.made
+
+
+HUGE = [Huge(np.ndarray, (10**12,)), Huge(np.zeros(0).__reduce__()[0], np.ndarray, (10**12,), b"b")]
+
+
+@pytest.mark.parametrize("content", [*HUGE, Harmful(), {"pc": Harmful()}, {"pc": np.zeros((3, 3))}, [1, 2], "text"])
 def test_op_align_files_run_nothing_and_lack_nothing(content: Any, tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.chdir(tmp_path)
     np.savez(tmp_path / "a.npz", np.array(content, dtype=object))
